@@ -18,11 +18,7 @@ pub enum Error {
     },
     /// Points that do not move with the robot.
     #[error("all {rows} points are one, {:.3}, {:.3}, {:.3} mm, although the joints moved: nothing was measured", point_mm[0], point_mm[1], point_mm[2])]
-    OnePoint {
-        rows: usize,
-        /// The point.
-        point_mm: [f64; 3],
-    },
+    OnePoint { rows: usize, point_mm: [f64; 3] },
     /// Robot and measurements are not about the same machine.
     #[error("the robot has {robot} joints, the measurements have {measurements}{}", missing.as_ref().map_or_else(String::new, |column| format!("; there is no column `{column}`")))]
     JointCount {
@@ -77,7 +73,6 @@ pub enum Error {
         "none of the {rows} rows can be judged: a row is judged by its distance to another of its group, or by a placement that takes {needed}"
     )]
     NothingJudged {
-        /// Rows to judge.
         rows: usize,
         /// Rows that a group is placed by.
         needed: usize,
@@ -91,7 +86,6 @@ pub enum Error {
         group: String,
         /// Poses with a point.
         found: usize,
-        /// Poses that are needed.
         needed: usize,
     },
     /// The sensor is on the flange.
@@ -107,10 +101,7 @@ pub enum Error {
     },
     /// Nothing says how well the robot is known.
     #[error("{path} says nothing of how well it is known")]
-    NotKnown {
-        /// The robot's file.
-        path: String,
-    },
+    NotKnown { path: String },
     /// The poses leave a direction open.
     #[error("these poses do not tell {direction}: they leave it open")]
     Open {
@@ -154,14 +145,15 @@ impl Explain for Error {
             Error::JointCount { missing: Some(column), .. } => {
                 Some(format!("add column `{column}`, or name the robot that was measured with `--robot FILE`"))
             }
-            Error::JointCount { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
+            Error::JointCount { .. } | Error::OtherRobot { .. } => {
+                Some("`--robot FILE` names the robot that was measured".to_owned())
+            }
             Error::NothingDetermined { .. } | Error::TooFew { .. } | Error::NothingJudged { .. } => {
                 Some("measure more poses, spread over the workspace and with varied orientation".to_owned())
             }
             Error::TooFewToPlace { .. } | Error::Open { .. } => Some(
                 "turn the flange about two axes that are not parallel, by 20 deg or more, over three poses or more of each group".to_owned(),
             ),
-            Error::OtherRobot { .. } => Some("`--robot FILE` names the robot that was measured".to_owned()),
             Error::CamerasOnHand { .. } => Some(
                 "with orientations, give each row the inverse of its pose (point -R'p, rotation vector -r): the board is then the sensor, and \
                  flange_from_target is where the camera sits on the hand"

@@ -72,6 +72,13 @@ pub struct Length {
     pub extra: RowDVector<f64>,
 }
 
+impl Length {
+    /// What the residual gains with extra unknowns of these values, mm.
+    pub fn gained(&self, extras: &[f64]) -> f64 {
+        self.extra.iter().zip(extras).map(|(x, e)| x * e).sum()
+    }
+}
+
 /// A measured point in the sensor's frame.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spot {
@@ -89,6 +96,16 @@ pub struct Spot {
     pub weight: f64,
     /// What the residual gains with each extra unknown, mm.
     pub extra: Matrix3xX<f64>,
+}
+
+/// A residual before whitening, and the variance that the measurement gives it.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Raw {
+    /// A length; the scatter enters so many times.
+    Length(f64, f64, f64),
+    Point(Vector3<f64>, Matrix3<f64>),
+    /// An orientation, rad.
+    Turn(Vector3<f64>),
 }
 
 /// How large a smooth error is, and how smooth.

@@ -1,9 +1,12 @@
 //! A small world for tests: the paper's robot with Table 2's errors, measured on spheres round the paper's four start points.
 
-use nalgebra::{Point3, Rotation3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::data::dataset::Dataset;
+use super::run::{Identification, identify};
+use super::settings::{Method, Settings};
 use crate::geometry::Transform;
 use crate::measurements::{Measurement, Observed, RobotPose, Role};
 use crate::robot::{Robot, inverse};
@@ -13,8 +16,46 @@ pub struct World {
     /// As its maker delivers it.
     pub nominal: Robot,
     pub truth: Robot,
-    /// What was measured.
     pub rows: Vec<Measurement>,
+}
+
+impl World {
+    /// What these rows tell of the nominal robot.
+    pub fn identified(&self, rows: &[Measurement]) -> (Dataset, Identification) {
+        let set = Dataset::new(rows).unwrap();
+        let found = identified(&set, &self.nominal);
+        (set, found)
+    }
+}
+
+/// What a set tells by the trust region alone.
+pub fn identified(set: &Dataset, nominal: &Robot) -> Identification {
+    identify(set, nominal, &settings(), 1, &|_| {}).unwrap()
+}
+
+/// The trust region alone.
+pub fn settings() -> Settings {
+    Settings { method: Some(Method::TrustRegion), ..Settings::default() }
+}
+
+/// A row of a target without a name.
+pub fn row(pose: String, group: &str, role: Role, joints_deg: Vec<f64>, observed: Observed) -> Measurement {
+    let at = RobotPose { pose, group: group.to_owned(), role, joints_deg, slides: vec![] };
+    Measurement { at, target: String::new(), observed }
+}
+
+/// A point about which nothing else is stated.
+pub fn seen_at(point_mm: Point3<f64>) -> Observed {
+    Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None }
+}
+
+/// States the covariances of points.
+pub fn state(rows: &mut [Measurement], covariance: impl Fn(&RobotPose) -> Option<Matrix3<f64>>) {
+    for row in rows {
+        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
+            *covariance_mm2 = covariance(&row.at);
+        }
+    }
 }
 
 /// Start points of section 4.2, mm in the base frame.
@@ -66,15 +107,7 @@ pub fn planned(
             let q_deg: Vec<f64> = q.iter().map(|r| r.to_degrees()).collect();
             let q_rad: Vec<f64> = q_deg.iter().map(|d| d.to_radians()).collect();
             let point = sensor(group) * truth.target_mm(&q_rad) + noise_mm * normal(&mut random);
-            let at = RobotPose {
-                pose: format!("p{}", rows.len()),
-                group: format!("g{group}"),
-                role,
-                joints_deg: q_deg,
-                slides: vec![],
-            };
-            let observed = Observed::Position { point_mm: point, covariance_mm2: None, rotation_rad: None };
-            rows.push(Measurement { at, target: String::new(), observed });
+            rows.push(row(format!("p{}", rows.len()), &format!("g{group}"), role, q_deg, seen_at(point)));
             break;
         }
     }
@@ -86,6 +119,19 @@ fn starts() -> Vec<Vec<f64>> {
     (0..8).map(|k| vec![0.785 * k as f64 - 3.0, 0.6, -1.2, 0.5, 1.3, 0.2]).collect()
 }
 
+/// Distances of all spheres' poses to the first sphere's centre, as one group: by the index of the row, where the robot is and where from.
+pub fn to_first(world: &World, distance: impl Fn(usize, Point3<f64>, Point3<f64>) -> f64) -> Dataset {
+    let place = |row: &Measurement| world.truth.target_mm(&row.at.joints_rad());
+    let (mut rows, from) = (world.rows.clone(), place(&world.rows[0]));
+    let mut index = 0..;
+    rows.retain(|row| index.next() == Some(0) || row.at.role != Role::Center);
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.at.group = "one".into();
+        row.observed = Observed::Distance { distance_mm: distance(i, place(row), from), sigma_mm: None };
+    }
+    Dataset::new(&rows).unwrap()
+}
+
 /// What a tracker reads of several targets on the flange, by their places in the last joint's frame, mm, and the noise of a coordinate.
 pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64, seed: u64) -> Vec<Measurement> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
@@ -95,8 +141,8 @@ pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64
         let sensor_from_flange = sensor(group) * world.truth.base_from_flange(&row.at.joints_rad());
         for (name, place) in targets {
             let point_mm = sensor_from_flange * Point3::from(*place) + noise_mm * normal(&mut random);
-            let observed = Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None };
-            rows.push(Measurement { at: row.at.clone(), target: (*name).to_owned(), observed });
+            let target = (*name).to_owned();
+            rows.push(Measurement { at: row.at.clone(), target, observed: seen_at(point_mm) });
         }
     }
     rows
@@ -172,13 +218,8 @@ pub fn touched(moved_mm: f64, seed: u64) -> (World, Vec<Vector3<f64>>) {
         for (i, joints) in postures.iter().enumerate() {
             let group = format!("s{}", sockets.len());
             let joints_deg = joints.iter().map(|q| q.to_degrees()).collect();
-            let pose = format!("{group}_{i}");
-            let at = RobotPose { pose, group, role: Role::Sample, joints_deg, slides: vec![] };
-            world.rows.push(Measurement {
-                at,
-                target: String::new(),
-                observed: Observed::Distance { distance_mm: 0.0, sigma_mm: None },
-            });
+            let touch = Observed::Distance { distance_mm: 0.0, sigma_mm: None };
+            world.rows.push(row(format!("{group}_{i}"), &group, Role::Sample, joints_deg, touch));
         }
         sockets.push(socket);
     }

@@ -1,36 +1,33 @@
 //! The paper's experiment rebuilt: four spheres, 262 poses and 50 to verify, Table 2's values as truth.
 
-use crate::identify::data::dataset::{Dataset, Reading};
+use nalgebra::{Matrix3, Matrix3xX, Vector3};
+
+use crate::identify::data::dataset::{Dataset, Pose};
 use crate::identify::judge::errors::{Judge, Spread};
+use crate::identify::record::findings::{Findings, findings};
 use crate::identify::record::quality;
 use crate::identify::run::identify;
-use crate::identify::settings::{Extensions, Method, Model, Prior, Settings};
+use crate::identify::settings::{Extensions, Method, Model, Prior, Redundancy, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::task::Task;
 use crate::identify::synthetic::{self, World};
+use crate::measurements::{Observed, Role};
 use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use crate::robot::{Parameter, Robot};
 
 /// Noise of a coordinate in the rebuilt experiment, mm.
 const NOISE_MM: f64 = 0.02;
 
 fn formulated(
     set: &Dataset,
-    robot: &crate::robot::Robot,
-    parameters: &[crate::robot::Parameter],
+    robot: &Robot,
+    parameters: &[Parameter],
     model: Model,
     settings: &Settings,
 ) -> Formulation {
-    Formulation::new(&Task {
-        set,
-        robot,
-        parameters,
-        extras: &[],
-        rows: &set.fit_rows(),
-        model,
-        smooth: None,
-        settings,
-    })
-    .unwrap()
+    let rows = set.fit_rows();
+    let plain = Task::plain(set, robot, parameters, &rows, settings);
+    Formulation::new(&Task { model, ..plain }).unwrap()
 }
 
 fn settings(method: Method) -> Settings {
@@ -47,13 +44,13 @@ fn mean_errors(world: &World, method: Method, seed: u64) -> (f64, f64) {
     let settings = settings(method);
     let found = identify(&set, &world.nominal, &settings, seed, &|_| {}).unwrap();
     let mean = |robot| quality(&set, robot, true, &found, &settings).0.verify.distance.mean_abs_mm.unwrap();
-    (mean(&world.nominal), mean(&found.candidates[found.chosen].robot))
+    (mean(&world.nominal), mean(found.robot()))
 }
 
-fn base_names(world: &World) -> (Formulation, Vec<String>) {
+fn base_names(world: &World, redundancy: Redundancy) -> (Formulation, Vec<String>) {
     let set = Dataset::new(&world.rows).unwrap();
     let parameters = world.nominal.mdh_parameters();
-    let off = Settings { prior: Prior::Off, ..Settings::default() };
+    let off = Settings { redundancy, prior: Prior::Off, ..Settings::default() };
     let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &off);
     (prepared, parameters.iter().map(|p| p.name()).collect())
 }
@@ -71,23 +68,21 @@ fn the_papers_experiment_ends_at_the_noise() {
 fn a_target_that_the_file_puts_on_the_last_axis_is_found_where_it_is() {
     let mut world = synthetic::planned(60, 30, 25.0, 0.01, 5, &|_| {});
     let found = |world: &World| {
-        let set = Dataset::new(&world.rows).unwrap();
-        let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-        let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
-        let robot = &found.candidates[found.chosen].robot;
-        let point = quality(&set, robot, true, &found, &settings).0.verify.point.unwrap().mean_abs_mm.unwrap();
+        let (set, found) = world.identified(&world.rows);
+        let (quality, _) = quality(&set, found.robot(), true, &found, &synthetic::settings());
+        let point = quality.verify.point.unwrap().mean_abs_mm.unwrap();
         (point, found.outliers.len() + found.doubtful.len() + found.verify_outliers.len())
     };
     let (where_it_is, _) = found(&world);
     // From there, what turns about the target moves nothing; where it is, the poses see it.
-    world.nominal.tool_mm = nalgebra::Vector3::zeros();
+    world.nominal.tool_mm = Vector3::zeros();
     let (on_the_axis, far) = found(&world);
     assert!(on_the_axis < 1.05 * where_it_is && far == 0, "{on_the_axis} {where_it_is} {far}");
 }
 
 #[test]
 fn equation_13_and_what_it_misses() {
-    let (varied, names) = base_names(&synthetic::planned(262, 0, 25.0, 0.0, 3, &|_| {}));
+    let (varied, names) = base_names(&synthetic::planned(262, 0, 25.0, 0.0, 3, &|_| {}), Redundancy::Qr);
     let zero: Vec<&str> = varied.base.zero.iter().map(|&i| names[i].as_str()).collect();
     // Eq. (13) has a_0 and d_1; alpha_0 and theta_1 move the whole robot too, and no distance sees that.
     assert_eq!(zero, ["alpha_0", "a_0", "theta_1", "d_1"]);
@@ -100,7 +95,7 @@ fn equation_13_and_what_it_misses() {
 #[test]
 fn one_orientation_hides_the_tool_and_more() {
     for seed in [3, 4] {
-        let (fixed, names) = base_names(&synthetic::planned(262, 0, 0.0, 0.0, seed, &|_| {}));
+        let (fixed, names) = base_names(&synthetic::planned(262, 0, 0.0, 0.0, seed, &|_| {}), Redundancy::Qr);
         let zero: Vec<&str> = fixed.base.zero.iter().map(|&i| names[i].as_str()).collect();
         for hidden in ["d_6", "v_x", "v_y", "v_z"] {
             assert!(zero.contains(&hidden), "{hidden}: {zero:?}");
@@ -112,20 +107,13 @@ fn one_orientation_hides_the_tool_and_more() {
 #[test]
 fn the_nineteen_of_the_paper_are_more_than_its_plan_determines() {
     let world = synthetic::planned(262, 0, 0.0, 0.0, 3, &|_| {});
-    let set = Dataset::new(&world.rows).unwrap();
-    let parameters = world.nominal.mdh_parameters();
-    let settings = Settings {
-        redundancy: crate::identify::settings::Redundancy::Correlation,
-        prior: Prior::Off,
-        ..Settings::default()
-    };
-    let prepared = formulated(&set, &world.nominal, &parameters, Model::CenterDistance, &settings);
+    let (prepared, _) = base_names(&world, Redundancy::Correlation);
     assert!(prepared.base.rank() <= 14, "{}", prepared.base.rank());
 }
 
 #[test]
 fn unmodelled_effects_treat_all_methods_alike() {
-    let spoil = |robot: &mut crate::robot::Robot| {
+    let spoil = |robot: &mut Robot| {
         robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 2.5e-3 }];
         robot.corrections.harmonics = (0..6)
             .map(|joint| HarmonicTerm {
@@ -167,7 +155,7 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
     let (mut inside, mut total) = (0, 0);
     for seed in 0..20 {
         let world = synthetic::planned(60, 0, 25.0, NOISE_MM, 40 + seed, &|truth| {
-            let mut plain = crate::robot::Robot::paper();
+            let mut plain = Robot::paper();
             plain.tool_mm = truth.tool_mm;
             *truth = plain;
             for (i, joint) in truth.joints.iter_mut().enumerate().skip(1) {
@@ -193,14 +181,13 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
 
 /// The world's rows as cameras read them that state covariances of 0.2 mm at a metre, and see everything larger by this factor.
 fn seen_by_cameras(world: &World, scale: f64) -> Dataset {
-    use crate::measurements::Observed;
     let mut rows = world.rows.clone();
-    let before_them = nalgebra::Vector3::new(0.0, 0.0, 1000.0);
+    let before_them = Vector3::new(0.0, 0.0, 1000.0);
     for row in &mut rows {
         if let Observed::Position { point_mm, covariance_mm2, rotation_rad } = &mut row.observed {
             *point_mm = ((point_mm.coords + before_them) * scale).into();
-            *covariance_mm2 = Some(nalgebra::Matrix3::identity() * 0.04);
-            *rotation_rad = Some(nalgebra::Vector3::zeros());
+            *covariance_mm2 = Some(Matrix3::identity() * 0.04);
+            *rotation_rad = Some(Vector3::zeros());
         }
     }
     let mut set = Dataset::new(&rows).unwrap();
@@ -212,50 +199,37 @@ fn seen_by_cameras(world: &World, scale: f64) -> Dataset {
 fn cameras_of_a_wrong_scale_do_not_stretch_the_robot() {
     // A robot within its tolerance, seen 2 thousandths too large: of its 800 mm that would be 1.6.
     let world = synthetic::planned(120, 30, 25.0, 0.2, 7, &|truth| {
-        let mut built = crate::robot::Robot::paper();
+        let mut built = Robot::paper();
         built.tool_mm = truth.tool_mm;
         built.joints.iter_mut().enumerate().for_each(|(i, j)| j.a_mm += 0.3 * (i as f64).cos());
         *truth = built;
     });
     // Its orientations are there to say that it was cameras, and none of them is right.
     let model = Some(Model::Position);
-    let method = Settings { method: Some(Method::TrustRegion), model, ..Settings::default() };
-    let length = |robot: &crate::robot::Robot| robot.joints[2].a_mm + robot.joints[3].a_mm;
+    let method = Settings { model, ..synthetic::settings() };
+    let length = |robot: &Robot| robot.joints[2].a_mm + robot.joints[3].a_mm;
+    let off = |set: &Dataset| {
+        let found = identify(set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        (length(found.robot()) - length(&world.truth)).abs()
+    };
     let set = seen_by_cameras(&world, 1.002);
-    let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-    let stretched = (length(&found.candidates[found.chosen].robot) - length(&world.truth)).abs();
-    let mut trusted = set.clone();
-    (trusted.shared, trusted.supposed_scale) = (Vec::new(), None);
-    let found = identify(&trusted, &world.nominal, &method, 1, &|_| {}).unwrap();
-    let fooled = (length(&found.candidates[found.chosen].robot) - length(&world.truth)).abs();
+    let (stretched, fooled) = (off(&set), off(&Dataset { shared: Vec::new(), supposed_scale: None, ..set.clone() }));
     assert!(stretched < 0.5 * fooled, "{stretched} against {fooled}");
 }
 
 #[test]
 fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
     let world = synthetic::planned(200, 40, 25.0, NOISE_MM, 5, &|_| {});
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let error = |zero_mm: f64| {
-        use crate::measurements::{Observed, Role};
-        // Distances of all spheres' poses to the first sphere's centre: on one sphere a zero is a scale.
-        let place = |row: &crate::measurements::Measurement| world.truth.target_mm(&row.at.joints_rad());
-        let mut rows: Vec<_> = world.rows.iter().filter(|r| r.at.role != Role::Center).cloned().collect();
-        rows.insert(0, world.rows[0].clone());
-        let from = place(&rows[0]);
-        for (i, row) in rows.iter_mut().enumerate() {
-            let noise_mm = 1.4 * NOISE_MM * (2.7 * i as f64).sin();
-            let distance_mm = (place(row) - from).norm() + zero_mm + noise_mm;
-            row.at.group = "one".into();
-            row.observed = Observed::Distance { distance_mm, sigma_mm: None };
-        }
-        let set = Dataset::new(&rows).unwrap();
-        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let said = crate::identify::record::findings::findings(&set, &found, &Default::default());
+        // On one sphere a zero is a scale.
+        let set = synthetic::to_first(&world, |i, place, from| {
+            (place - from).norm() + zero_mm + 1.4 * NOISE_MM * (2.7 * i as f64).sin()
+        });
+        let found = synthetic::identified(&set, &world.nominal);
+        let said = findings(&set, &found, &Default::default());
         let said = said.iter().any(|f| f.finding.contains("the zero of the readings is off"));
-        let (extras, values): (Vec<_>, Vec<f64>) = found.extras.iter().copied().unzip();
-        let plain = Judge::plain(&set, &found.fitted, method.wire_offset);
-        let errors = Judge { extras: &extras, values: &values, ..plain }
-            .errors(&found.candidates[found.chosen].robot, &set.verify_rows());
+        let judge = Judge { extras: &found.extras, ..Judge::plain(&set, &found.fitted, true) };
+        let errors = judge.errors(found.robot(), &set.verify_rows());
         (Spread::new(errors.iter().filter_map(|e| e.distance_mm)).mean_abs_mm.unwrap(), said)
     };
     let (right, alarm) = error(0.0);
@@ -271,7 +245,6 @@ fn a_zero_that_is_off_costs_next_to_nothing_and_is_said() {
 fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain() {
     use crate::identify::judge::uncertainty::Expected;
     let world = synthetic::world(120, NOISE_MM, 3);
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let told = |size_mm: f64| {
         let mut rows = world.rows.clone();
         for row in &mut rows {
@@ -279,16 +252,12 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
             let point = synthetic::point(row);
             *point += size_mm * point.coords.map(|c| (c / 60.0 + 1.7 * group).sin());
         }
-        let set = Dataset::new(&rows).unwrap();
-        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let (formulation, _) = found.candidates[found.chosen].found.as_ref().unwrap();
-        let findings = crate::identify::record::findings::findings(&set, &found, &Default::default());
+        let (set, found) = world.identified(&rows);
+        let formulation = found.formulation().unwrap();
+        let findings = findings(&set, &found, &Default::default());
         let said = findings.iter().any(|f| f.finding.contains("smooth error"));
-        (
-            said,
-            formulation.rows.left_by_smooth_mm2().sqrt(),
-            Expected::new(formulation, &set, &found.fitted).of_robot_mm,
-        )
+        let of_robot_mm = Expected::new(formulation, &set, &found.fitted).of_robot_mm;
+        (said, formulation.rows.left_by_smooth_mm2().sqrt(), of_robot_mm)
     };
     let (alarm, _, clean_mm) = told(0.0);
     assert!(!alarm);
@@ -302,17 +271,14 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
 
 #[test]
 fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too() {
-    use crate::measurements::Role;
     let world = synthetic::world(120, NOISE_MM, 6);
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     let verify = world.rows.iter().position(|r| r.at.role == Role::Verify).unwrap();
     for sigmas in [0.0, 6.5, 9.0, 100.0] {
         let mut rows = world.rows.clone();
         for i in [40, verify] {
             synthetic::point(&mut rows[i]).x += sigmas * NOISE_MM;
         }
-        let set = Dataset::new(&rows).unwrap();
-        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
+        let (_, found) = world.identified(&rows);
         let named = [&found.outliers, &found.doubtful].map(|list| list.as_slice()).concat();
         assert_eq!(named, if sigmas > 0.0 { vec![40] } else { vec![] }, "{sigmas}");
         assert!(sigmas < 8.0 || found.doubtful.is_empty(), "{sigmas}: fitted");
@@ -325,20 +291,12 @@ fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too(
 #[test]
 fn readings_of_another_scale_are_said_to_be_so() {
     let world = synthetic::world(120, NOISE_MM, 8);
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     for (scale, said) in [(1.0, false), (0.95, true), (1.05, true)] {
         let mut rows = world.rows.clone();
         rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
-        let set = Dataset::new(&rows).unwrap();
-        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let findings = crate::identify::record::findings::Findings::new(
-            Vec::new(),
-            (Vec::new(), None),
-            Vec::new(),
-            &Default::default(),
-            &set,
-            &found,
-        );
+        let (set, found) = world.identified(&rows);
+        let cause = (Vec::new(), None);
+        let findings = Findings::new(Vec::new(), cause, Vec::new(), &Default::default(), &set, &found);
         let doubt = findings.doubts.iter().any(|f| f.finding.contains("all links are found"));
         assert_eq!(doubt, said, "{scale}: {findings:?}");
     }
@@ -346,36 +304,24 @@ fn readings_of_another_scale_are_said_to_be_so() {
 
 #[test]
 fn points_without_noise_give_the_true_robot_whatever_covariances_they_state() {
-    use crate::measurements::Observed;
     let world = synthetic::world(60, 0.0, 8);
-    let method = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
     // None; and such that the data outweigh the tolerances by more than double precision holds.
     for stated_mm in [0.0, 1e-4, 0.002, 0.1] {
         let mut rows = world.rows.clone();
-        for row in &mut rows {
-            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-                let covariance = nalgebra::Matrix3::from_diagonal_element(stated_mm * stated_mm);
-                *covariance_mm2 = (stated_mm > 0.0).then_some(covariance);
-            }
-        }
+        let covariance = Matrix3::from_diagonal_element(stated_mm * stated_mm);
+        synthetic::state(&mut rows, |_| (stated_mm > 0.0).then_some(covariance));
         let mut set = Dataset::new(&rows).unwrap();
         if stated_mm > 0.0 {
             // A scale, and bends of space, that all rows share.
-            let columns = |p: &nalgebra::Vector3<f64>| {
-                let c = p.map(|v| v / 500.0);
-                [c, c.map(|v| v * v), nalgebra::Vector3::new(c.y * c.z, c.x * c.z, c.x * c.y), c * c.z]
-            };
-            let shared = |pose: &crate::identify::data::dataset::Pose| match &pose.reading {
-                Reading::Position { point_mm, .. } => {
-                    nalgebra::Matrix3xX::from_columns(&columns(&point_mm.coords).map(|c| c * 0.003))
-                }
-                _ => nalgebra::Matrix3xX::zeros(4),
+            let shared = |pose: &Pose| {
+                let c = pose.reading.point_mm().unwrap().coords.map(|v| v / 500.0);
+                let bends = [c, c.map(|v| v * v), Vector3::new(c.y * c.z, c.x * c.z, c.x * c.y), c * c.z];
+                Matrix3xX::from_columns(&bends.map(|bend| bend * 0.003))
             };
             set.shared = set.poses.iter().map(shared).collect();
         }
-        let found = identify(&set, &world.nominal, &method, 1, &|_| {}).unwrap();
-        let robot = &found.candidates[found.chosen].robot;
-        let errors = Judge::plain(&set, &found.fitted, true).errors(robot, &set.verify_rows());
+        let found = synthetic::identified(&set, &world.nominal);
+        let errors = Judge::plain(&set, &found.fitted, true).errors(found.robot(), &set.verify_rows());
         let worst = errors.iter().filter_map(|e| e.point_mm).map(|p| p.norm()).fold(0.0, f64::max);
         assert!(worst < 1e-3, "{stated_mm}: {} leaves {worst} mm", found.terms.name());
     }

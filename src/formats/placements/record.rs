@@ -99,7 +99,7 @@ impl PlacementFile {
         let group = |placed: &Placed, index: usize| {
             let group = placed.groups[index].0;
             let of_group = held_out.iter().filter(|e| set.poses[e.row].group == group);
-            let sensor = placed.sensor_from_base(index).inverse().after(&placed.robot().ends.root_from_frame0);
+            let sensor = placed.sensor_from_base(index).inverse().after(&placed.robot.ends.root_from_frame0);
             GroupRecord {
                 group: set.groups[group].name.clone(),
                 base_from_rig: TransformRecord::new(&sensor, true, true),
@@ -108,7 +108,7 @@ impl PlacementFile {
             }
         };
         let target = |placed: &Placed| {
-            let target = placed.target().after(&placed.robot().ends.last_frame_from_flange.inverse());
+            let target = placed.target().after(&placed.robot.ends.last_frame_from_flange.inverse());
             TransformRecord::new(&target, placed.oriented, placed.target_found)
         };
         PlacementFile {
@@ -148,7 +148,7 @@ impl PlacementFile {
 
 /// What stands as the robot's file has it.
 fn held(placed: &Placed) -> Vec<Held> {
-    let robot = placed.robot();
+    let robot = &placed.robot;
     let joints = robot.joints.len();
     let held = robot.mdh_parameters().into_iter().filter(|p| is_held(*p, joints));
     let (of_base, of_flange): (Vec<Parameter>, Vec<Parameter>) = held.partition(|p| is_held(*p, usize::MAX));

@@ -15,9 +15,10 @@ use crate::robot::Robot;
 use crate::tables::names::Unit;
 
 /// What all readings of a set are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Kind {
     /// Points in the group's own frame.
+    #[default]
     Positions,
     /// Distances to the group's centre, or to a fixed point that is unknown.
     Distances,
@@ -44,6 +45,20 @@ pub enum Reading {
 }
 
 impl Reading {
+    /// The point; `None` of distances.
+    pub fn point_mm(&self) -> Option<Point3<f64>> {
+        if let Reading::Position { point_mm, .. } = self { Some(*point_mm) } else { None }
+    }
+
+    pub fn covariance_mm2(&self) -> Option<Matrix3<f64>> {
+        if let Reading::Position { covariance_mm2, .. } = self { *covariance_mm2 } else { None }
+    }
+
+    /// `sensor_from_target` as a rotation vector.
+    pub fn rotation_rad(&self) -> Option<Vector3<f64>> {
+        if let Reading::Position { rotation_rad, .. } = self { *rotation_rad } else { None }
+    }
+
     /// Mean variance of a coordinate, or of the distance, that it states, mm^2.
     pub fn variance_mm2(&self) -> Option<f64> {
         match self {
@@ -64,7 +79,6 @@ pub struct Pose {
     pub role: Role,
     /// Commanded angles, rad.
     pub joints_rad: Vec<f64>,
-    /// What was read.
     pub reading: Reading,
     /// Where on a body of several targets the point stands, from its mark point and in the body's frame, mm; `None` for the mark point itself.
     pub on_body_mm: Option<Vector3<f64>>,
@@ -87,9 +101,8 @@ pub struct Skipped {
 }
 
 /// All that can be used, in the order of the file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Dataset {
-    /// What the readings are.
     pub kind: Kind,
     /// Placements, in order of appearance.
     pub groups: Vec<Group>,
@@ -148,22 +161,8 @@ impl Dataset {
         let (rows, repeats) = repeats::as_one(rows);
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };
-        let mut set = Dataset {
-            kind,
-            groups: Vec::new(),
-            poses: Vec::new(),
-            skipped: Vec::new(),
-            repeats,
-            shared: Vec::new(),
-            supposed_scale: None,
-            slides: Vec::new(),
-            floored: Vec::new(),
-            known: Vec::new(),
-            targets,
-            files: Vec::new(),
-            typed_unit: None,
-        };
-        set.slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
+        let slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
+        let mut set = Dataset { kind, repeats, slides, targets, ..Dataset::default() };
         for row in &rows {
             let group = set.group(&row.at.group);
             if let Observed::Position { covariance_mm2: Some(c), .. } = &row.observed
@@ -224,6 +223,20 @@ impl Dataset {
         (0..self.poses.len()).filter(|&i| keep(&self.poses[i])).collect()
     }
 
+    /// Those of these rows that are of a group.
+    pub fn of_group(&self, rows: &[usize], group: usize) -> Vec<usize> {
+        rows.iter().copied().filter(|&row| self.poses[row].group == group).collect()
+    }
+
+    pub fn joint_count(&self) -> usize {
+        self.poses.first().map_or(0, |pose| pose.joints_rad.len())
+    }
+
+    /// Whether a joint slides, by its index.
+    pub fn is_sliding(&self, joint: usize) -> bool {
+        self.slides.get(joint) == Some(&true)
+    }
+
     /// Their names.
     pub fn names(&self, rows: &[usize]) -> Vec<String> {
         rows.iter().map(|&row| self.poses[row].name.clone()).collect()
@@ -234,9 +247,9 @@ impl Dataset {
         if self.kind != Kind::Positions {
             return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
         }
-        let rows = self.rows(|pose| matches!(pose.reading, Reading::Position { .. }));
+        let rows = self.rows(|pose| pose.reading.point_mm().is_some());
         for (index, group) in self.groups.iter().enumerate() {
-            let found = rows.iter().filter(|&&row| self.poses[row].group == index).count();
+            let found = self.of_group(&rows, index).len();
             if found < fewest {
                 return Err(Error::TooFewToPlace { group: group.name.clone(), found, needed: fewest });
             }
@@ -266,10 +279,7 @@ impl Dataset {
         let points: Vec<(usize, Point3<f64>)> = fitted
             .iter()
             .filter(|&&i| self.poses[i].group == group && self.poses[i].on_body_mm.is_none())
-            .filter_map(|&i| match self.poses[i].reading {
-                Reading::Position { point_mm, .. } => Some((i, point_mm)),
-                _ => None,
-            })
+            .filter_map(|&i| Some((i, self.poses[i].reading.point_mm()?)))
             .collect();
         let count = points.len().max(1) as f64;
         let centroid = points.iter().fold(Vector3::zeros(), |sum, (_, p)| sum + p.coords) / count;
@@ -287,16 +297,10 @@ impl Dataset {
             && matches!(pose.reading, Reading::Distance { distance_mm, .. } if distance_mm == 0.0)
     }
 
-    /// Whether every pose has a covariance.
-    pub fn has_covariances(&self) -> bool {
-        self.poses.iter().all(|p| matches!(p.reading, Reading::Position { covariance_mm2: Some(_), .. }))
-    }
-
     /// Whether cameras read it: they state an orientation and a covariance with each point. Other instruments (a tracker, a wire, a probe) state
     /// at most one of these.
     pub fn is_of_cameras(&self) -> bool {
-        let both =
-            |p: &Pose| matches!(p.reading, Reading::Position { rotation_rad: Some(_), covariance_mm2: Some(_), .. });
+        let both = |p: &Pose| p.reading.rotation_rad().is_some() && p.reading.covariance_mm2().is_some();
         !self.shared.is_empty() || self.poses.iter().any(both)
     }
 
@@ -308,7 +312,7 @@ impl Dataset {
     /// Whether every pose has an orientation, but for those that show a part of a body of several targets.
     pub fn has_rotations(&self) -> bool {
         let mut whole = self.poses.iter().filter(|p| p.on_body_mm.is_none()).peekable();
-        whole.peek().is_some() && whole.all(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. }))
+        whole.peek().is_some() && whole.all(|p| p.reading.rotation_rad().is_some())
     }
 
     /// Whether the places of targets are those in the flange's frame: of targets that the robot joined.
@@ -353,21 +357,14 @@ fn reading(kind: Kind, row: &Measurement) -> Result<Reading, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::identify::synthetic;
 
     fn row(name: usize, role: Role, observed: Observed) -> Measurement {
-        let at = RobotPose {
-            pose: format!("p{name}"),
-            group: "g".into(),
-            role,
-            joints_deg: vec![name as f64],
-            slides: vec![],
-        };
-        Measurement { at, target: String::new(), observed }
+        synthetic::row(format!("p{name}"), "g", role, vec![name as f64], observed)
     }
 
     fn point(x: f64) -> Observed {
-        Observed::Position { point_mm: Point3::new(x, 0.0, 0.0), covariance_mm2: None, rotation_rad: None }
+        synthetic::seen_at(Point3::new(x, 0.0, 0.0))
     }
 
     #[test]

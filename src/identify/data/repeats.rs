@@ -124,12 +124,11 @@ fn mean(rows: &[Measurement]) -> Measurement {
                 _ => None,
             });
             point_mm.coords = points.sum::<Vector3<f64>>() / count;
-            let stated: Option<Vec<Matrix3<f64>>> =
-                rows.iter()
-                    .map(|r| {
-                        if let Observed::Position { covariance_mm2, .. } = &r.observed { *covariance_mm2 } else { None }
-                    })
-                    .collect();
+            let covariance = |r: &Measurement| match r.observed {
+                Observed::Position { covariance_mm2, .. } => covariance_mm2,
+                _ => None,
+            };
+            let stated: Option<Vec<Matrix3<f64>>> = rows.iter().map(covariance).collect();
             *covariance_mm2 = stated.map(|all| all.iter().sum::<Matrix3<f64>>() / count);
         }
         Observed::Distance { distance_mm, .. } => {
@@ -143,20 +142,12 @@ fn mean(rows: &[Measurement]) -> Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::identify::synthetic;
     use nalgebra::Point3;
 
     fn row(joint: f64, x: f64) -> Measurement {
-        let at = RobotPose {
-            pose: format!("{joint} {x}"),
-            group: "g".into(),
-            role: Role::Sample,
-            joints_deg: vec![joint],
-            slides: vec![],
-        };
-        let observed =
-            Observed::Position { point_mm: Point3::new(x, 0.0, 0.0), covariance_mm2: None, rotation_rad: None };
-        Measurement { at, target: String::new(), observed }
+        let observed = synthetic::seen_at(Point3::new(x, 0.0, 0.0));
+        synthetic::row(format!("{joint} {x}"), "g", Role::Sample, vec![joint], observed)
     }
 
     #[test]

@@ -51,18 +51,12 @@ struct PoseSensitivity {
     sensitivity: Vec<Vec<f64>>,
 }
 
-/// What a series' covariances are made of, row by row.
-struct Parts {
-    columns: Vec<Matrix3xX<f64>>,
-    own: Vec<Matrix3<f64>>,
-}
-
 /// Takes the shared errors of the `measure.json` at `path` out of the rows' covariances and puts them beside the rows. Nothing is
 /// changed where the file has none, or has them for other poses.
 pub fn take(path: &Utf8Path, set: &mut Dataset) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(Measured { shared: Some(shared) }) = serde_json::from_slice(&bytes) else { return };
-    if let Some(Parts { columns, own }) = split(&shared, set) {
+    if let Some((columns, own)) = split(&shared, set) {
         for (pose, own) in set.poses.iter_mut().zip(own) {
             if let Reading::Position { covariance_mm2, .. } = &mut pose.reading {
                 *covariance_mm2 = Some(own);
@@ -77,24 +71,19 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
 /// length, and nothing in the residuals tells; with the scale unknown, the links' tolerance has a say. Several targets are a tracker's, whose
 /// scale is its laser's.
 pub fn suppose_scale(set: &mut Dataset) {
-    if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !set.has_covariances() {
+    let is_stated = set.poses.iter().all(|pose| pose.reading.covariance_mm2().is_some());
+    if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !is_stated {
         return;
     }
-    let point = |pose: &Pose| match &pose.reading {
-        Reading::Position { point_mm, covariance_mm2: Some(covariance), .. } => Some((point_mm.coords, *covariance)),
-        _ => None,
+    let point = |pose: &Pose| pose.reading.point_mm().map_or_else(Vector3::zeros, |point| point.coords);
+    let relative = |pose: &Pose| {
+        let distance = point(pose).norm();
+        let largest = pose.reading.covariance_mm2()?.symmetric_eigenvalues().max();
+        (distance > 0.0).then(|| largest.max(0.0).sqrt() / distance)
     };
-    let relative = |(point, covariance): (Vector3<f64>, Matrix3<f64>)| {
-        let distance = point.norm();
-        (distance > 0.0).then(|| covariance.symmetric_eigenvalues().max().max(0.0).sqrt() / distance)
-    };
-    let Some(noise) = median(set.poses.iter().filter_map(|p| relative(point(p)?))) else { return };
+    let Some(noise) = median(set.poses.iter().filter_map(relative)) else { return };
     let scale = SCALE_OVER_POINT * noise;
-    set.shared = set
-        .poses
-        .iter()
-        .map(|p| Matrix3xX::from_columns(&[point(p).map_or(Vector3::zeros(), |(point, _)| -scale * point)]))
-        .collect();
+    set.shared = set.poses.iter().map(|p| Matrix3xX::from_columns(&[-scale * point(p)])).collect();
     set.supposed_scale = Some(scale);
 }
 
@@ -110,7 +99,7 @@ pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
 }
 
 /// Columns of the leading shared errors and own covariance, row by row.
-fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
+fn split(shared: &Shared, set: &Dataset) -> Option<(Vec<Matrix3xX<f64>>, Vec<Matrix3<f64>>)> {
     let count = shared.covariance.len();
     if count == 0 || shared.covariance.iter().any(|row| row.len() != count) {
         return None;
@@ -133,7 +122,7 @@ fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
     let directions = eigen.eigenvectors.select_columns(&leading);
     let (mut columns, mut own) = (Vec::new(), Vec::new());
     for (pose, moved) in set.poses.iter().zip(&moves) {
-        let Reading::Position { covariance_mm2: Some(whole), .. } = &pose.reading else { return None };
+        let whole = pose.reading.covariance_mm2()?;
         let of_row = moved * &directions;
         let rest = whole - Matrix3::from_fn(|r, c| of_row.row(r).dot(&of_row.row(c)));
         if rest.symmetric_eigenvalues().min() < -ROUNDING * whole.trace() {
@@ -142,7 +131,7 @@ fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
         own.push(positive(rest));
         columns.push(Matrix3xX::from_fn(leading.len(), |r, c| of_row[(r, c)]));
     }
-    Some(Parts { columns, own })
+    Some((columns, own))
 }
 
 /// A matrix R with R R' the covariance.
@@ -188,10 +177,10 @@ mod tests {
     #[test]
     fn what_is_shared_leaves_the_rows_own_covariance() {
         let (set, shared) = set_and_shared();
-        let Parts { columns, own } = split(&shared, &set).unwrap();
+        let (columns, own) = split(&shared, &set).unwrap();
         assert_eq!((columns.len(), columns[0].ncols()), (set.poses.len(), 2));
         for (columns, (own, pose)) in columns.iter().zip(own.iter().zip(&set.poses)) {
-            let Reading::Position { covariance_mm2: Some(whole), .. } = &pose.reading else { panic!() };
+            let whole = pose.reading.covariance_mm2().unwrap();
             assert!((own - Matrix3::identity() * 1e-4).norm() < 1e-12, "{own}");
             assert!((columns * columns.transpose() + own - whole).norm() < 1e-12);
         }

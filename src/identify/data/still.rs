@@ -1,8 +1,10 @@
 //! What did not move: poses that the robot came back to, and joints that are the same in all rows.
 
+use std::collections::BTreeSet;
+
 use nalgebra::Point3;
 
-use super::dataset::{Dataset, Reading};
+use super::dataset::Dataset;
 use crate::identify::Error;
 
 /// Joints within this, rad or mm, are the same.
@@ -13,14 +15,7 @@ const SAME_POINT_MM: f64 = 1e-9;
 
 /// Refuses points of which all are one although the robot moved: nothing was measured.
 pub fn check_points(set: &Dataset) -> Result<(), Error> {
-    let points: Vec<Point3<f64>> = set
-        .poses
-        .iter()
-        .filter_map(|pose| match pose.reading {
-            Reading::Position { point_mm, .. } => Some(point_mm),
-            _ => None,
-        })
-        .collect();
+    let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
     let is_one = points.len() > 1 && points.iter().all(|point| (point - points[0]).norm() <= SAME_POINT_MM);
     let moved = set.poses.iter().any(|pose| pose.joints_rad != set.poses[0].joints_rad);
     match is_one && moved {
@@ -30,25 +25,26 @@ pub fn check_points(set: &Dataset) -> Result<(), Error> {
 }
 
 /// Rows of the same group at the same joints.
-pub fn repeated(set: &Dataset) -> Option<(Vec<String>, String)> {
-    let mut order: Vec<usize> = (0..set.poses.len()).collect();
-    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
-    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+pub fn repeated(set: &Dataset) -> Vec<String> {
+    let order = by_joints(set, set.rows(|_| true));
     let same = |a: usize, b: usize| {
         let pairs = set.poses[a].joints_rad.iter().zip(&set.poses[b].joints_rad);
         set.poses[a].group == set.poses[b].group && pairs.into_iter().all(|(p, q)| (p - q).abs() <= SAME_JOINT)
     };
-    let mut rows: Vec<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
-    rows.sort_unstable();
-    rows.dedup();
-    let found =
-        "poses that the robot came back to: they say how well it repeats, and nothing about its links".to_owned();
-    (!rows.is_empty()).then(|| (set.names(&rows), found))
+    let rows: BTreeSet<usize> = order.windows(2).filter(|w| same(w[0], w[1])).flat_map(|w| [w[0], w[1]]).collect();
+    set.names(&rows.into_iter().collect::<Vec<_>>())
 }
 
-/// Joints that do not move.
-pub fn constant_joints(set: &Dataset) -> Vec<usize> {
+/// Rows by group, and within it by their joints.
+pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
+    let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
+    rows.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
+    rows
+}
+
+/// Joints that do not move, by their numbers from 1.
+pub fn constant_joints(set: &Dataset) -> Vec<String> {
     let Some(first) = set.poses.first() else { return Vec::new() };
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
-    (0..first.joints_rad.len()).filter(constant).collect()
+    (0..set.joint_count()).filter(constant).map(|joint| (joint + 1).to_string()).collect()
 }

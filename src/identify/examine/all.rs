@@ -32,15 +32,13 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let mut unexplained_mm = None;
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
-        let of_rows = shifted::examine(&set, &robot);
-        Mended { set, robot, findings, against, unexplained_mm } = conventions::examine(&of_rows.0, &robot, settings);
-        findings.splice(0..0, of_rows.1);
-        let of_orientations = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
-        set = of_orientations.0;
-        findings.extend(of_orientations.1);
-        let of_known = known::examine(&set, &robot, settings);
-        set = of_known.0;
-        findings.extend(of_known.1);
+        let (of_rows, of_orientations, of_known);
+        (set, of_rows) = shifted::examine(&set, &robot);
+        Mended { set, robot, findings, against, unexplained_mm } = conventions::examine(&set, &robot, settings);
+        findings.splice(0..0, of_rows);
+        (set, of_orientations) = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
+        (set, of_known) = known::examine(&set, &robot, settings);
+        findings.extend(of_orientations.into_iter().chain(of_known));
     }
     step("sessions along the rows");
     let robots = if settings.examine { robots::find(&set, &robot, settings) } else { None };
@@ -57,9 +55,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
     against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));
     if settings.examine {
-        let of_covariances = covariances::examine(&set, &robot, settings);
-        set = of_covariances.0;
-        findings.extend(of_covariances.1);
+        let of_covariances;
+        (set, of_covariances) = covariances::examine(&set, &robot, settings);
+        findings.extend(of_covariances);
     }
     findings.splice(0..0, of_targets);
     let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(conventions::unexplained);

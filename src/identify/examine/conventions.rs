@@ -71,7 +71,6 @@ pub struct Mended {
     pub set: Dataset,
     /// The robot as it is to be used.
     pub robot: Robot,
-    /// What was mended.
     pub findings: Vec<Finding>,
     /// What was mended and yet speaks against the file: its rows are not of one kind.
     pub against: Vec<Finding>,
@@ -103,10 +102,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             tried = explaining(&open, &set, &robot, settings, &now, false);
         }
         let least = tried.iter().map(|(there, _)| there.fitted).fold(f64::INFINITY, f64::min);
+        let product = |of: &Misfit| of.nominal * of.target * of.fitted;
         let best = tried
             .iter()
             .filter(|(there, _)| there.fitted <= ALIKE * least)
-            .min_by(|(a, _), (b, _)| a.product().total_cmp(&b.product()));
+            .min_by(|(a, _), (b, _)| product(a).total_cmp(&product(b)));
         let Some(&(there, hypothesis)) = best.filter(|(there, _)| cut.is_none_or(|cut| there.fitted < cut)) else {
             break;
         };
@@ -200,11 +200,6 @@ impl Misfit {
         Misfit { nominal: self.nominal / factor, target: self.target / factor, fitted: self.fitted / factor }
     }
 
-    /// All three at once, to compare hypotheses by.
-    fn product(&self) -> f64 {
-        self.nominal * self.target * self.fitted
-    }
-
     /// Whose errors fall, mm: from what they were now to these, which are in the file's unit. That unit is so many times what it was said to be.
     fn fallen(&self, now: &Misfit, factor: f64) -> (&'static str, f64, f64) {
         let (whose, from, to) = match self.fitted * EXPLAINS < now.fitted {
@@ -251,10 +246,8 @@ fn some_rows(set: &Dataset) -> Vec<usize> {
     if all.len() <= ROWS {
         return all;
     }
-    let of_groups: Vec<Vec<usize>> = (0..set.groups.len())
-        .map(|g| all.iter().copied().filter(|&row| set.poses[row].group == g).collect::<Vec<_>>())
-        .filter(|rows| !rows.is_empty())
-        .collect();
+    let of_groups = (0..set.groups.len()).map(|group| set.of_group(&all, group));
+    let of_groups: Vec<Vec<usize>> = of_groups.filter(|rows| !rows.is_empty()).collect();
     let each = (ROWS / of_groups.len()).max(ROWS_A_GROUP);
     let apart = of_groups.len().div_ceil(ROWS / each);
     let some = |rows: &Vec<usize>| rows.iter().copied().step_by(rows.len().div_ceil(each)).collect::<Vec<_>>();

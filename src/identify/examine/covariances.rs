@@ -83,14 +83,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, V
 fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, Error> {
     let rows = set.fit_rows();
     let name = |row: usize| set.groups[set.poses[row].group].name.as_str();
-    let mut of_groups: BTreeMap<&str, (usize, f64)> = BTreeMap::new();
-    for &row in &rows {
-        let (count, sum) = of_groups.entry(name(row)).or_default();
-        *count += 1;
-        *sum += set.poses[row].reading.variance_mm2().unwrap_or(0.0);
-    }
-    let stated: BTreeMap<&str, f64> =
-        of_groups.iter().map(|(name, (count, sum))| (*name, sum / *count as f64)).collect();
+    let mut of_groups: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
+    rows.iter().for_each(|&row| of_groups.entry(name(row)).or_default().push(row));
+    let variance = |row: &usize| set.poses[*row].reading.variance_mm2().unwrap_or(0.0);
+    let mean = |rows: &Vec<usize>| rows.iter().map(variance).sum::<f64>() / rows.len() as f64;
+    let stated: BTreeMap<&str, f64> = of_groups.iter().map(|(name, rows)| (*name, mean(rows))).collect();
     if stated.len() < GROUPS || stated.values().any(|s| *s <= 0.0) {
         return Ok(Vec::new());
     }
@@ -107,8 +104,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
     let deleted = robust.deleted();
     let unit_mm2 = robust.scatter.stated * middle_mm2 + robust.scatter.point_mm.powi(2);
     let of_group = |(name_of, stated_mm2): (&&str, &f64)| {
-        let of_group = rows.iter().copied().filter(|&r| name(r) == *name_of).map(|r| deleted[r]);
-        let rows: Vec<_> = of_group.filter(|d| d.numbers > 0).collect();
+        let rows: Vec<_> = of_groups[name_of].iter().map(|&row| deleted[row]).filter(|d| d.numbers > 0).collect();
         let numbers = rows.first()?.numbers;
         if numbers * rows.len() < FEWEST {
             return None;
@@ -193,9 +189,11 @@ fn scale(set: &mut Dataset, name: &str, factor: f64) {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{Matrix3, Matrix3xX, Vector3};
+
     use super::*;
     use crate::identify::synthetic;
-    use crate::measurements::Observed;
+    use crate::measurements::Measurement;
 
     const NOISE_MM: f64 = 0.02;
 
@@ -204,12 +202,10 @@ mod tests {
     fn examined(of_group: f64, of_all: f64) -> (Vec<String>, f64) {
         let world = synthetic::world(120, NOISE_MM, 4);
         let mut rows = world.rows.clone();
-        for row in &mut rows {
-            let sd_mm = NOISE_MM * of_all * if row.at.group == "g1" { of_group } else { 1.0 };
-            if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * sd_mm * sd_mm);
-            }
-        }
+        synthetic::state(&mut rows, |at| {
+            let sd_mm = NOISE_MM * of_all * if at.group == "g1" { of_group } else { 1.0 };
+            Some(Matrix3::identity() * sd_mm * sd_mm)
+        });
         let set = Dataset::new(&rows).unwrap();
         let (set, findings) = examine(&set, &world.nominal, &Settings::default());
         let first = |name: &str| {
@@ -241,21 +237,18 @@ mod tests {
         let world = synthetic::world(120, NOISE_MM, 4);
         let mut rows = world.rows.clone();
         // The first group stands where the calibration's error is large.
-        let column = |i: usize, row: &crate::measurements::Measurement| {
-            nalgebra::Vector3::z() * if row.at.group == "g1" { 0.2 * (1.7 * i as f64).sin() } else { 0.0 }
+        let column = |i: usize, row: &Measurement| {
+            Vector3::z() * if row.at.group == "g1" { 0.2 * (1.7 * i as f64).sin() } else { 0.0 }
         };
         for (i, row) in rows.iter_mut().enumerate() {
             let moved = column(i, row);
-            if let Observed::Position { point_mm, covariance_mm2, .. } = &mut row.observed {
-                *point_mm += moved;
-                *covariance_mm2 = Some(nalgebra::Matrix3::identity() * NOISE_MM * NOISE_MM);
-            }
+            *synthetic::point(row) += moved;
         }
+        synthetic::state(&mut rows, |_| Some(Matrix3::identity() * NOISE_MM * NOISE_MM));
         let mut set = Dataset::new(&rows).unwrap();
         let said = |set: &Dataset| examine(set, &world.nominal, &Settings::default()).1.len();
         assert_eq!(said(&set), 1);
-        set.shared =
-            rows.iter().enumerate().map(|(i, row)| nalgebra::Matrix3xX::from_columns(&[column(i, row)])).collect();
+        set.shared = rows.iter().enumerate().map(|(i, row)| Matrix3xX::from_columns(&[column(i, row)])).collect();
         assert_eq!((set.shared.len(), said(&set)), (set.poses.len(), 0));
     }
 

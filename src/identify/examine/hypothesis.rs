@@ -48,16 +48,18 @@ fn way(set: &Dataset, joint: usize) -> f64 {
 
 /// Joints that hardly move: what is said of their columns the tool's place undoes.
 pub fn still(set: &Dataset) -> Vec<usize> {
-    (0..set.poses.first().map_or(0, |pose| pose.joints_rad.len())).filter(|&j| way(set, j) < STILL).collect()
+    (0..set.joint_count()).filter(|&j| way(set, j) < STILL).collect()
 }
 
 /// All that may be wrong with a set of this kind.
 pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
-    let joints = set.poses.first().map_or(0, |p| p.joints_rad.len());
+    let joints = set.joint_count();
     let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
     // A touch reads no length.
     let touches = (0..set.poses.len()).any(|row| set.touches(row));
-    list.extend(parts(set));
+    if !touches && small_part(set).is_some() {
+        list.extend([(1000.0, "m"), (25.4, "inches"), (10.0, "cm")].map(|(mm, unit)| Hypothesis::Part(mm, unit)));
+    }
     let read_as = set.typed_unit.unwrap_or(Unit::Mm);
     for unit in [Unit::M, Unit::Inch, Unit::Cm, Unit::Um, Unit::Mm].into_iter().filter(|unit| *unit != read_as) {
         match touches {
@@ -70,12 +72,12 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
         list.push(Hypothesis::Mirrored);
     }
     let still = still(set);
-    let turns = |i: usize| !still.contains(&i) && !set.slides.get(i).copied().unwrap_or(false);
+    let turns = |i: usize| !still.contains(&i) && !set.is_sliding(i);
     for i in 0..joints {
         list.push(Hypothesis::Negated(i));
         list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
         // Radians that were taken for degrees move the joint by a fraction of its way.
-        if !set.slides.get(i).copied().unwrap_or(false) && way(set, i).to_degrees() > STILL {
+        if !set.is_sliding(i) && way(set, i).to_degrees() > STILL {
             list.push(Hypothesis::JointRadians(i));
         }
         if i > 0 && turns(i) && turns(i - 1) {
@@ -146,9 +148,11 @@ impl Hypothesis {
 
     /// The set and the robot as they are if it holds.
     pub fn applied(self, set: &Dataset, robot: &Robot) -> (Dataset, Robot) {
+        let slides = |joint: usize| set.is_sliding(joint);
         let (mut set, mut robot) = (set.clone(), robot.clone());
         match self {
-            Hypothesis::Radians => in_degrees(&mut set),
+            // Of joints that slide the numbers are no angles.
+            Hypothesis::Radians => (0..set.joint_count()).filter(|&j| !slides(j)).for_each(|j| in_degrees(&mut set, j)),
             Hypothesis::Lengths(factor, ..) => set.poses.iter_mut().for_each(|pose| scale(pose, factor)),
             Hypothesis::KnownLengths(factor, _) => {
                 for known in &mut set.known {
@@ -156,9 +160,7 @@ impl Hypothesis {
                     known.sigma_mm *= factor;
                 }
             }
-            Hypothesis::JointRadians(i) => {
-                set.poses.iter_mut().for_each(|p| p.joints_rad[i] = p.joints_rad[i].to_degrees());
-            }
+            Hypothesis::JointRadians(i) => in_degrees(&mut set, i),
             Hypothesis::Part(factor, _) => {
                 for row in small_part(&set).unwrap_or_default() {
                     scale(&mut set.poses[row], factor);
@@ -200,21 +202,9 @@ fn small_part(set: &Dataset) -> Option<Vec<usize>> {
     Some(rows)
 }
 
-fn parts(set: &Dataset) -> Vec<Hypothesis> {
-    let units = [(1000.0, "m"), (25.4, "inches"), (10.0, "cm")].map(|(factor, unit)| Hypothesis::Part(factor, unit));
-    let touches = (0..set.poses.len()).any(|row| set.touches(row));
-    if !touches && small_part(set).is_some() { units.to_vec() } else { Vec::new() }
-}
-
-/// Joints that turn, their numbers taken for radians.
-fn in_degrees(set: &mut Dataset) {
-    for pose in &mut set.poses {
-        for (j, q) in pose.joints_rad.iter_mut().enumerate() {
-            if !set.slides.get(j).copied().unwrap_or(false) {
-                *q = q.to_degrees();
-            }
-        }
-    }
+/// A joint, its numbers taken for radians.
+fn in_degrees(set: &mut Dataset, joint: usize) {
+    set.poses.iter_mut().for_each(|pose| pose.joints_rad[joint] = pose.joints_rad[joint].to_degrees());
 }
 
 fn scale(pose: &mut Pose, factor: f64) {

@@ -42,7 +42,6 @@ pub fn mended(set: &Dataset, robot: &Robot, mended: &Robot) -> Option<Dataset> {
 /// What was found wrong with rows of a robot that is known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OfKnown {
-    /// The rows without it.
     pub set: Dataset,
     pub finding: Finding,
 }

@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 
 use nalgebra::{UnitQuaternion, Vector3};
 
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::{Dataset, Pose, Reading};
 use crate::identify::finding::Finding;
 use crate::robot::Robot;
 use crate::statistics::median;
@@ -47,12 +47,10 @@ pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Fi
     let tried =
         HYPOTHESES.iter().filter_map(|(name, reader)| Some((difference_rad(&set, robot, *reader)?, name, reader)));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-    let degrees = |rad: f64| rad.to_degrees();
-    let finding = |finding: String, action: &str| Some(Finding::new(finding, action));
     let Some((left, name, reader)) = best.filter(|(left, ..)| left * EXPLAINS < as_read) else {
         let said = format!(
             "the orientations contradict the joint angles: between poses the target turns by {:.1} deg more or less than the flange",
-            degrees(as_read)
+            as_read.to_degrees()
         );
         if !asked {
             for pose in &mut set.poses {
@@ -61,10 +59,8 @@ pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Fi
                 }
             }
         }
-        return (
-            set,
-            finding(said, "they are left out unless `--model pose` asks for them; look at rx_rad, ry_rad, rz_rad"),
-        );
+        let action = "they are left out unless `--model pose` asks for them; look at rx_rad, ry_rad, rz_rad";
+        return (set, Some(Finding::new(said, action)));
     };
     for pose in &mut set.poses {
         if let Reading::Position { rotation_rad: Some(rotation), .. } = &mut pose.reading {
@@ -73,10 +69,11 @@ pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Fi
     }
     let said = format!(
         "the orientations are {name} (turns between poses differ from the flange's by {:.2} deg, before by {:.1})",
-        degrees(left),
-        degrees(as_read)
+        left.to_degrees(),
+        as_read.to_degrees()
     );
-    (set, finding(said, "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)"))
+    let action = "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)";
+    (set, Some(Finding::new(said, action)))
 }
 
 /// Several targets count with their turn; a pose whose turn is another one is left out. Their lengths don't tell the names of targets that
@@ -85,16 +82,11 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
     if set.targets.is_none() {
         return (set, None);
     }
-    let turns: Vec<_> = set
-        .poses
-        .iter()
-        .map(|pose| match pose.reading {
-            Reading::Position { rotation_rad: Some(rotation), .. } => {
-                Some((UnitQuaternion::from_scaled_axis(rotation), robot.base_from_flange(&pose.joints_rad).rotation))
-            }
-            _ => None,
-        })
-        .collect();
+    let turn = |pose: &Pose| {
+        let read = UnitQuaternion::from_scaled_axis(pose.reading.rotation_rad()?);
+        Some((read, robot.base_from_flange(&pose.joints_rad).rotation))
+    };
+    let turns: Vec<_> = set.poses.iter().map(turn).collect();
     let is_turned = |&row: &usize| {
         let of_group = set.rows(|p| p.group == set.poses[row].group);
         let step = (of_group.len() / PAIRS).max(1);
@@ -120,10 +112,7 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
 /// Median difference between the target's turn from pose to pose and the flange's, rad; `None` without orientations in two poses of one
 /// group.
 fn difference_rad(set: &Dataset, robot: &Robot, reader: Reader) -> Option<f64> {
-    let oriented = |row: usize| match set.poses[row].reading {
-        Reading::Position { rotation_rad: Some(rotation), .. } => Some(reader(rotation)),
-        _ => None,
-    };
+    let oriented = |row: usize| set.poses[row].reading.rotation_rad().map(reader);
     let flange = |row: usize| robot.base_from_flange(&set.poses[row].joints_rad).rotation;
     let mut differences = Vec::new();
     for group in 0..set.groups.len() {
@@ -189,11 +178,8 @@ mod tests {
             let (right, mended, said) = said(written);
             assert!(said.as_ref().is_some_and(|s| s.contains(name)), "{name}: {said:?}");
             for (a, b) in right.poses.iter().zip(&mended.poses) {
-                let turn = |p: &crate::identify::data::dataset::Pose| match p.reading {
-                    Reading::Position { rotation_rad, .. } => rotation_rad.map(UnitQuaternion::from_scaled_axis),
-                    _ => None,
-                };
-                assert!(turn(a).unwrap().angle_to(&turn(b).unwrap()) < 1e-6, "{name}");
+                let [a, b] = [a, b].map(|p| UnitQuaternion::from_scaled_axis(p.reading.rotation_rad().unwrap()));
+                assert!(a.angle_to(&b) < 1e-6, "{name}");
             }
         }
     }

@@ -10,6 +10,7 @@
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket four touches, are not seen.
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use nalgebra::DMatrix;
@@ -125,7 +126,7 @@ fn gross_errors(task: &Task) -> Vec<usize> {
 /// One placement as the search sees it.
 struct Placed {
     /// Rows of the data set in their order, each with where its residuals start and end.
-    rows: Vec<(usize, std::ops::Range<usize>)>,
+    rows: Vec<(usize, Range<usize>)>,
     /// A column an unknown of a new placement, where only some rows belong to it.
     fresh: Fresh,
     /// Row of the centre that was measured, from which on things move.
@@ -136,19 +137,6 @@ struct Placed {
     rivalled: bool,
     /// The sum of squares of which it must then explain a share.
     squares: f64,
-}
-
-/// Where each row's numbers stand, of the rows that the numbers belong to one after the other.
-fn ranges(rows: impl Iterator<Item = Option<usize>>) -> Vec<(usize, std::ops::Range<usize>)> {
-    let mut ranges: Vec<(usize, std::ops::Range<usize>)> = Vec::new();
-    for (i, row) in rows.enumerate() {
-        let Some(row) = row else { continue };
-        match ranges.last_mut() {
-            Some((last, range)) if *last == row => range.end = i + 1,
-            _ => ranges.push((row, i..i + 1)),
-        }
-    }
-    ranges
 }
 
 struct Search<'a> {
@@ -181,10 +169,7 @@ impl<'a> Search<'a> {
         let squares: f64 = parts.iter().map(|(_, p, _)| p.linear.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
         for (block, placement, own) in parts {
-            if matches!(block, Block::Pairwise(_)) {
-                continue;
-            }
-            let of_rows = ranges(placement.poses.iter().map(|pose| Some(rows.rows[(*pose)?])));
+            let of_rows: Vec<_> = placement.by_pose().map(|(pose, at)| (rows.rows[pose], at)).collect();
             let (linear, inverse) =
                 (&placement.linear, Rc::new(pseudo_inverse(placement.with_others(&(&normal - own)))));
             let place = |rows, columns, center, rivalled| {
@@ -203,9 +188,8 @@ impl<'a> Search<'a> {
                     for socket in 0..touch.sockets.len() {
                         let contacts = of_rows.iter().zip(&touch.contacts).filter(|(_, c)| c.socket == socket);
                         let rows: Vec<_> = contacts.map(|(row, _)| row.clone()).collect();
-                        let of_row = |(_, at): &(usize, std::ops::Range<usize>)| {
-                            linear.residuals.rows(at.start, at.len()).norm_squared()
-                        };
+                        let of_row =
+                            |(_, at): &(usize, Range<usize>)| linear.residuals.rows(at.start, at.len()).norm_squared();
                         let squares = rows.iter().map(of_row).sum();
                         let fresh = linear.design.columns(3 * socket, 3).into_owned();
                         placed.push(Placed { shortest: SHORTEST_TOUCH, squares, ..place(rows, fresh, None, true) });
@@ -249,14 +233,13 @@ impl<'a> Search<'a> {
 
     /// The rows of a placement sorted by each joint.
     fn orders(&self, placed: &Placed) -> Vec<Vec<usize>> {
-        let joints = self.set.poses.first().map_or(0, |p| p.joints_rad.len());
         let sorted = |j: usize| {
             let mut order: Vec<usize> = (0..placed.rows.len()).collect();
             let angle = |k: &usize| self.set.poses[placed.rows[*k].0].joints_rad[j];
             order.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
             order
         };
-        (0..joints).map(sorted).collect()
+        (0..self.set.joint_count()).map(sorted).collect()
     }
 
     /// Groups whose placement moves evenly along their rows; where one of them is to be cut, only if that explains less.

@@ -10,7 +10,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use crate::geometry::{Transform, fitted_frame, rotation_matrix};
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::finding::Finding;
 use crate::robot::Robot;
 use crate::statistics::median;
@@ -83,23 +83,14 @@ impl Shift {
             self.after_mm
         )
     }
-
-    /// For the terminal and the page.
-    pub fn finding(&self, set: &Dataset) -> Finding {
-        Finding::new(
-            self.statement(set),
-            "mended for this run: look for a picture that failed or was taken twice there, and mend the file (`examine = false` in \
-                     [identify] takes it as it is)",
-        )
-    }
 }
 
 /// The set with readings at the rows that they are of, and what was wrong.
 pub fn examine(set: &Dataset, robot: &Robot) -> (Dataset, Option<Finding>) {
-    match find(set, robot) {
-        Some(shift) => (mended(set, &shift), Some(shift.finding(set))),
-        None => (set.clone(), None),
-    }
+    let Some(shift) = find(set, robot) else { return (set.clone(), None) };
+    let action = "mended for this run: look for a picture that failed or was taken twice there, and mend the file (`examine = false` in \
+                  [identify] takes it as it is)";
+    (mended(set, &shift), Some(Finding::new(shift.statement(set), action)))
 }
 
 /// Looks for a shift.
@@ -154,10 +145,6 @@ fn mended(set: &Dataset, shift: &Shift) -> Dataset {
 impl Rows {
     /// `None` of sets of anything but whole points, and of too few. `backwards` as seen from the flange.
     pub(super) fn new(set: &Dataset, robot: &Robot, backwards: bool) -> Option<Rows> {
-        let point = |reading: &Reading| match reading {
-            Reading::Position { point_mm, .. } => Some(*point_mm),
-            _ => None,
-        };
         let whole = set.poses.iter().all(|pose| pose.on_body_mm.is_none());
         if set.kind != Kind::Positions || set.poses.len() < FEWEST_ROWS || !whole {
             return None;
@@ -171,7 +158,7 @@ impl Rows {
             origins: flanges.iter().map(|f| f.translation.vector).collect(),
             rotations: flanges.iter().map(rotation_matrix).collect(),
             groups: set.poses.iter().map(|pose| pose.group).collect(),
-            points: set.poses.iter().map(|pose| point(&pose.reading)).collect::<Option<Vec<_>>>()?,
+            points: set.poses.iter().map(|pose| pose.reading.point_mm()).collect::<Option<Vec<_>>>()?,
             tool_mm: robot.tool_mm,
         })
     }

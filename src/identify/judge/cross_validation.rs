@@ -9,11 +9,12 @@
 //! What goes wrong: a model whose parameters move the target by so much that a linear model does not hold; nominal errors of 5 mm on a
 //! metre leave some hundredths.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::folds::FOLDS;
-use super::held_out::{CHANCE, HeldOut};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::Rows;
@@ -22,7 +23,7 @@ use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{Eliminated, pseudo_inverse};
 use crate::robot::Parameter;
 
-/// CrossValidation in all, about.
+/// Cells in all, about.
 const CELLS: usize = 12;
 
 /// The fold of rows that are always fitted.
@@ -30,6 +31,12 @@ const SKIPPED: usize = usize::MAX / 2;
 
 /// Placements from which on whole placements are held out.
 const WHOLE: usize = 3;
+
+/// Held-out errors of one model: of each cell the mean square of its numbers, mm^2, and how many there are.
+pub type HeldOut = Vec<(f64, f64)>;
+
+/// Chance with which a model that is no better may seem so: several are tried on every rung.
+const CHANCE: f64 = 0.01;
 
 /// A region of a placement.
 #[derive(Debug, Clone)]
@@ -58,7 +65,8 @@ pub struct CrossValidation {
     folds: Vec<Fold>,
     /// All cells fitted.
     whole: Fold,
-    whole_placements: bool,
+    /// Whether whole placements are held out, not regions of them.
+    pub whole_placements: bool,
     /// Root of the variance that stands for one, mm.
     unit_mm: f64,
 }
@@ -67,7 +75,7 @@ pub struct CrossValidation {
 type LabelsOfPoses<'a> = dyn Fn(&[Option<usize>]) -> Vec<Option<usize>> + 'a;
 
 impl CrossValidation {
-    /// CrossValidation of these labels, one a residual of each placement; `fold` is that of a placement's label.
+    /// By these labels, one a residual of each placement; `fold` is that of a placement's label.
     fn new(
         problem: &Linearised,
         rows: &Rows,
@@ -88,17 +96,15 @@ impl CrossValidation {
         }
         if !whole_placements {
             // A placement of few rows has fewer regions than there are numbers for.
-            let mut used: Vec<usize> = cells.iter().map(|c: &Cell| c.fold).filter(|f| *f < SKIPPED).collect();
-            used.sort_unstable();
-            used.dedup();
+            let used: BTreeSet<usize> = cells.iter().map(|c: &Cell| c.fold).filter(|f| *f < SKIPPED).collect();
             for cell in cells.iter_mut().filter(|c| c.fold < SKIPPED) {
-                cell.fold = used.binary_search(&cell.fold).unwrap_or(0);
+                cell.fold = used.range(..cell.fold).count();
             }
         }
         let folds = cells.iter().map(|c| c.fold + 1).filter(|f| *f < SKIPPED).max().unwrap_or(0);
         let make = |f: Option<usize>| Fold::new(&cells, problem.placements.len(), problem.shared, f);
         CrossValidation {
-            parameters: rows.kinematics.parameters().to_vec(),
+            parameters: rows.kinematics.parameters.clone(),
             extras: rows.extras.clone(),
             folds: (0..folds).map(|f| make(Some(f))).collect(),
             whole: make(None),
@@ -111,13 +117,11 @@ impl CrossValidation {
     /// Regions of joint space, or whole placements where there are three; `most` is the largest number of folds.
     pub fn by_regions(problem: &Linearised, rows: &Rows, set: &Dataset, most: usize) -> CrossValidation {
         let count = problem.placements.len();
-        let (regions, whole) =
-            (if count >= WHOLE { CELLS.div_ceil(count).min(3) } else { most / count.max(1) }, count >= WHOLE);
+        let whole = count >= WHOLE;
+        let regions = if whole { CELLS.div_ceil(count).min(3) } else { most / count.max(1) };
         let labels = |poses: &[Option<usize>]| labels(set, rows, poses, regions);
-        match whole {
-            true => CrossValidation::new(problem, rows, &labels, &|block, _| block % most, true),
-            false => CrossValidation::new(problem, rows, &labels, &|block, region| block * regions + region, false),
-        }
+        let fold = |block: usize, region: usize| if whole { block % most } else { block * regions + region };
+        CrossValidation::new(problem, rows, &labels, &fold, whole)
     }
 
     /// Rows here and there: `of_row` is the fold of each row of the data set.
@@ -142,11 +146,6 @@ impl CrossValidation {
         self.folds.iter().map(change).collect()
     }
 
-    /// Whether whole placements are held out, not regions of them.
-    pub fn whole_placements(&self) -> bool {
-        self.whole_placements
-    }
-
     fn columns(&self, parameters: &[Parameter]) -> Vec<usize> {
         let of_robot = parameters.iter().filter_map(|p| self.parameters.iter().position(|q| q == p));
         of_robot.chain(self.parameters.len()..self.parameters.len() + self.extras.len()).collect()
@@ -155,8 +154,8 @@ impl CrossValidation {
     /// Standard deviations of the model's parameters that make the data most probable, and the logarithm of that probability.
     pub fn tolerance(&self, parameters: &[Parameter]) -> (Tolerance, f64) {
         let columns = self.columns(parameters);
-        let normal = picked(&self.whole.normal, &columns);
-        let gradient = DVector::from_iterator(columns.len(), columns.iter().map(|&c| self.whole.gradient[c]));
+        let normal = self.whole.normal.select_rows(&columns).select_columns(&columns);
+        let gradient = self.whole.gradient.select_rows(&columns);
         Tolerance::from_evidence_of_all(parameters, &self.extras, &normal, &gradient)
     }
 
@@ -176,7 +175,7 @@ impl CrossValidation {
         };
         let mut pulls = vec![DVector::<f64>::zeros(n); self.folds.len()];
         let mut informations = vec![DMatrix::<f64>::zeros(n, n); self.folds.len()];
-        for cell in &self.cells {
+        for cell in self.cells.iter().filter(|cell| cell.fold < SKIPPED) {
             let Some(follow) = &self.whole.follows[cell.block] else { continue };
             // The parameters' columns with the placement following them, and the residuals at the solution.
             let all = x.len();
@@ -190,9 +189,6 @@ impl CrossValidation {
             moves.rows_mut(0, all + 1).copy_from(&kept);
             moves.rows_mut(all + 1, follow.nrows()).copy_from(&-(follow * kept));
             let products = moves.transpose() * &cell.normal * &moves;
-            if cell.fold >= SKIPPED {
-                continue;
-            }
             pulls[cell.fold] += products.view((0, n), (n, 1)).column(0);
             informations[cell.fold] += products.view((0, 0), (n, n));
         }
@@ -285,27 +281,16 @@ impl Fold {
 }
 
 fn sum<'a>(cells: impl Iterator<Item = &'a Cell>) -> Option<DMatrix<f64>> {
-    cells.fold(None, |sum: Option<DMatrix<f64>>, cell| {
-        Some(match sum {
-            Some(sum) => sum + &cell.normal,
-            None => cell.normal.clone(),
-        })
-    })
-}
-
-fn picked(matrix: &DMatrix<f64>, columns: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(columns.len(), columns.len(), |r, c| matrix[(columns[r], columns[c])])
+    cells.map(|cell| cell.normal.clone()).reduce(|sum, normal| sum + normal)
 }
 
 /// The region of each residual; `None` for what belongs to no pose.
 fn labels(set: &Dataset, rows: &Rows, poses: &[Option<usize>], regions: usize) -> Vec<Option<usize>> {
-    let mut present: Vec<usize> = poses.iter().flatten().copied().collect();
-    present.sort_unstable();
-    present.dedup();
+    let present: BTreeSet<usize> = poses.iter().flatten().copied().collect();
     let mut label = vec![0; rows.rows.len()];
     let mut next = 0;
     let regions = regions.min(present.len()).max(1);
-    divide(set, rows, present, regions, &mut next, &mut label);
+    divide(set, rows, present.into_iter().collect(), regions, &mut next, &mut label);
     poses.iter().map(|p| p.map(|p| label[p])).collect()
 }
 
@@ -327,6 +312,35 @@ fn divide(set: &Dataset, rows: &Rows, mut poses: Vec<usize>, regions: usize, nex
     let right = poses.split_off((poses.len() * first).div_ceil(regions));
     divide(set, rows, poses, first, next, label);
     divide(set, rows, right, regions - first, next, label);
+}
+
+/// Whether `new` is clearly below `old`: its mean square is less, and by Student's test of the paired cells either the squares fall or
+/// their logarithms do. Squares say what a few bad regions gain; logarithms see that all regions gain where the old errors are of very
+/// different size.
+pub fn clearly_less(new: &HeldOut, old: &HeldOut) -> bool {
+    let pairs: Vec<(f64, f64)> = new.iter().zip(old).filter(|((_, n), _)| *n > 0.0).map(|(n, o)| (n.0, o.0)).collect();
+    if pairs.len() < 2 || new.len() != old.len() || root_mean(new) >= root_mean(old) {
+        return false;
+    }
+    let squares = pairs.iter().map(|(n, o)| o - n).collect();
+    let logarithms = pairs.iter().map(|(n, o)| (o.max(f64::MIN_POSITIVE) / n.max(f64::MIN_POSITIVE)).ln()).collect();
+    clearly_positive(squares) || clearly_positive(logarithms)
+}
+
+/// Whether the mean of these gains is more than chance.
+fn clearly_positive(gains: Vec<f64>) -> bool {
+    let gains = DVector::from_vec(gains);
+    let freedom = (gains.len() - 1) as f64;
+    let standard_error = (gains.variance() / freedom).sqrt();
+    let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else { return false };
+    gains.mean() > student.inverse_cdf(1.0 - CHANCE) * standard_error
+}
+
+/// Root mean square of held-out errors, mm a number.
+pub fn root_mean(held_out: &HeldOut) -> Option<f64> {
+    let numbers: f64 = held_out.iter().map(|(_, n)| n).sum();
+    let squares: f64 = held_out.iter().map(|(s, n)| s * n).sum();
+    (numbers > 0.0).then(|| (squares / numbers).sqrt())
 }
 
 #[cfg(test)]

@@ -7,8 +7,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::geometry::Transform;
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::{Extra, Scatter};
@@ -21,15 +20,12 @@ pub const PLACED_BY_ITSELF: usize = 4;
 /// Figures of absolute errors, as in Table 3 of the paper.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Number of errors.
     pub count: usize,
     /// Mean of their absolute values, mm.
     pub mean_abs_mm: Option<f64>,
     /// Standard deviation of their absolute values, mm.
     pub std_mm: Option<f64>,
-    /// Largest, mm.
     pub max_abs_mm: Option<f64>,
-    /// Smallest, mm.
     pub min_abs_mm: Option<f64>,
 }
 
@@ -38,14 +34,11 @@ impl Spread {
     pub fn new(errors_mm: impl IntoIterator<Item = f64>) -> Spread {
         let errors: Vec<f64> = errors_mm.into_iter().map(f64::abs).collect();
         let count = errors.len();
-        if count == 0 {
-            return Spread { count, mean_abs_mm: None, std_mm: None, max_abs_mm: None, min_abs_mm: None };
-        }
         let mean = errors.iter().sum::<f64>() / count as f64;
         let squares: f64 = errors.iter().map(|e| (e - mean).powi(2)).sum();
         Spread {
             count,
-            mean_abs_mm: Some(mean),
+            mean_abs_mm: (count > 0).then_some(mean),
             std_mm: (count > 1).then(|| (squares / (count - 1) as f64).sqrt()),
             max_abs_mm: errors.iter().copied().reduce(f64::max),
             min_abs_mm: errors.iter().copied().reduce(f64::min),
@@ -82,7 +75,6 @@ impl RowError {
 /// Errors as all robots are judged in one run.
 #[derive(Debug, Clone)]
 pub struct Judge<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// Rows that place the sensor.
     pub fitted: &'a [usize],
@@ -90,9 +82,8 @@ pub struct Judge<'a> {
     pub scatter: Scatter,
     /// Whether a wire's zero is unknown.
     pub wire_offset: bool,
-    /// Unknowns of the sensor.
-    pub extras: &'a [Extra],
-    pub values: &'a [f64],
+    /// Unknowns of the sensor, and their values.
+    pub extras: &'a [(Extra, f64)],
 }
 
 /// Weight of the placement's points where no fit has said anything else: covariances matter where they are larger than this, mm.
@@ -102,23 +93,18 @@ impl<'a> Judge<'a> {
     /// Without any unknown of the sensor.
     pub fn plain(set: &'a Dataset, fitted: &'a [usize], wire_offset: bool) -> Judge<'a> {
         let scatter = Scatter::of_point(PLACING_SCATTER_MM);
-        Judge { set, fitted, scatter, wire_offset, extras: &[], values: &[] }
+        Judge { set, fitted, scatter, wire_offset, extras: &[] }
     }
-}
 
-impl Judge<'_> {
     /// Errors of `rows`. Rows of groups that cannot be placed are left out.
     pub fn errors(&self, robot: &Robot, rows: &[usize]) -> Vec<RowError> {
         let mut list = Vec::with_capacity(rows.len());
         for group in 0..self.set.groups.len() {
-            let of = |all: &[usize]| -> Vec<usize> {
-                all.iter().copied().filter(|&i| self.set.poses[i].group == group).collect()
-            };
-            let judged = of(rows);
+            let judged = self.set.of_group(rows, group);
             if judged.is_empty() {
                 continue;
             }
-            let mut placing = of(self.fitted);
+            let mut placing = self.set.of_group(self.fitted, group);
             if !placing.iter().any(|&i| !matches!(self.set.poses[i].reading, Reading::Reference)) {
                 placing.extend(judged.iter().filter(|_| judged.len() >= PLACED_BY_ITSELF));
                 placing.sort_unstable();
@@ -135,8 +121,8 @@ impl Judge<'_> {
 
     fn placed(&self, robot: &Robot, rows: &[usize], model: Model) -> (Rows, Vec<f64>) {
         // How a body is turned on this robot's flange its rows say anew.
-        let of_sensor = |(extra, _): &(&Extra, &f64)| !matches!(extra, Extra::Target(_));
-        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().zip(self.values).filter(of_sensor).unzip();
+        let of_sensor = |(extra, _): &(Extra, f64)| !matches!(extra, Extra::Target(_));
+        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().filter(of_sensor).unzip();
         let rows = Rows::new(&RowSpec {
             set: self.set,
             robot,
@@ -152,10 +138,6 @@ impl Judge<'_> {
         (rows, values)
     }
 
-    fn extra(&self, of: Extra) -> f64 {
-        self.extras.iter().zip(self.values).filter(|(e, _)| **e == of).map(|(_, v)| *v).sum()
-    }
-
     /// A predicted and a measured point, the sensor's own errors taken off, and its covariance; `flange_from_body` is how a body of several
     /// targets is turned.
     fn point(
@@ -166,7 +148,7 @@ impl Judge<'_> {
     ) -> Option<(Point3<f64>, Point3<f64>, Matrix3<f64>)> {
         let Reading::Position { point_mm, covariance_mm2, .. } = &self.set.poses[row].reading else { return None };
         let mut measured = *point_mm;
-        for (extra, value) in self.extras.iter().zip(self.values) {
+        for (extra, value) in self.extras {
             measured -= extra.of_point(point_mm, self.set.shared.get(row)) * *value;
         }
         let pose = &self.set.poses[row];
@@ -179,13 +161,11 @@ impl Judge<'_> {
 
     fn of_points(&self, robot: &Robot, group: usize, placing: &[usize], judged: &[usize], list: &mut Vec<RowError>) {
         let (rows, values) = self.placed(robot, placing, Model::Position);
-        let turn =
-            rows.blocks.iter().find_map(|b| if let Block::Points(p) = b { Some(p.flange_from_target) } else { None });
-        let turn = turn.unwrap_or_else(Matrix3::identity);
-        let frame: Option<Transform> = rows.unknowns(&values).into_iter().find_map(|u| match u {
-            Unknowns::Frame(frame) => Some(frame),
+        let placed = rows.blocks.iter().zip(rows.unknowns(&values)).find_map(|both| match both {
+            (Block::Points(points), Unknowns::Frame(frame)) => Some((points.flange_from_target, frame)),
             _ => None,
         });
+        let turn = placed.map_or_else(Matrix3::identity, |(turn, _)| turn);
         let reference = self.set.reference(group, placing).and_then(|r| self.point(robot, r, &turn));
         for &row in judged {
             let Some((predicted, measured, covariance_mm2)) = self.point(robot, row, &turn) else { continue };
@@ -198,7 +178,7 @@ impl Judge<'_> {
                     variance_mm2 = (u.transpose() * (covariance_mm2 + c0) * u)[0];
                 }
             }
-            let point_mm = frame.as_ref().map(|f| f * predicted - measured);
+            let point_mm = placed.map(|(_, frame)| frame * predicted - measured);
             list.push(RowError { row, distance_mm, point_mm, variance_mm2, covariance_mm2 });
         }
     }
@@ -210,14 +190,14 @@ impl Judge<'_> {
             self.of_touches(&touches, &predicted, list);
             return;
         }
-        let center = self.set.groups[group].center.map(|c| (predicted(c), self.extra(Extra::Zero)));
+        let zero_mm: f64 = self.extras.iter().filter(|(e, _)| *e == Extra::Zero).map(|(_, v)| *v).sum();
+        let center = self.set.groups[group].center.map(|c| (predicted(c), zero_mm));
         let placed = center.or_else(|| {
             let (rows, values) = self.placed(robot, placing, Model::CenterDistance);
-            let wire = rows.blocks.iter().position(|b| matches!(b, Block::Wire(_)))?;
-            match rows.unknowns(&values).get(wire) {
-                Some(Unknowns::Anchor(anchor, zero)) => Some((Point3::from(*anchor), *zero)),
+            rows.unknowns(&values).into_iter().find_map(|unknowns| match unknowns {
+                Unknowns::Anchor(anchor, zero) => Some((Point3::from(anchor), zero)),
                 _ => None,
-            }
+            })
         });
         let Some((from, zero_mm)) = placed else { return };
         for &row in judged {
@@ -238,10 +218,7 @@ impl Judge<'_> {
         let mean = rows.iter().map(|&r| predicted(r).coords).sum::<Vector3<f64>>() / rows.len() as f64;
         for &row in rows {
             let off = predicted(row).coords - mean;
-            let variance_mm2 = match self.set.poses[row].reading {
-                Reading::Distance { sigma_mm: Some(s), .. } => s * s,
-                _ => 0.0,
-            };
+            let variance_mm2 = self.set.poses[row].reading.variance_mm2().unwrap_or(0.0);
             list.push(RowError {
                 row,
                 distance_mm: Some(off.norm()),
@@ -255,15 +232,12 @@ impl Judge<'_> {
     /// Predicted less known distances between touched points, of groups of which `rows` hold some, mm.
     pub fn distortion_mm(&self, robot: &Robot, rows: &[usize]) -> Vec<f64> {
         let mean = |group: usize| {
-            let points: Vec<Vector3<f64>> = rows
-                .iter()
-                .filter(|&&r| self.set.poses[r].group == group && self.set.touches(r))
-                .map(|&r| robot.target_mm(&self.set.poses[r].joints_rad).coords)
-                .collect();
+            let touches = self.set.of_group(rows, group).into_iter().filter(|&r| self.set.touches(r));
+            let points: Vec<Vector3<f64>> =
+                touches.map(|r| robot.target_mm(&self.set.poses[r].joints_rad).coords).collect();
             (!points.is_empty()).then(|| points.iter().sum::<Vector3<f64>>() / points.len() as f64)
         };
-        let off =
-            |k: &crate::identify::data::dataset::KnownDistance| Some((mean(k.a)? - mean(k.b)?).norm() - k.distance_mm);
+        let off = |k: &KnownDistance| Some((mean(k.a)? - mean(k.b)?).norm() - k.distance_mm);
         self.set.known.iter().filter_map(off).collect()
     }
 }

@@ -9,6 +9,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::errors::{Judge, RowError};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::still::by_joints;
 use crate::measurements::Role;
 use crate::robot::Robot;
 
@@ -20,9 +21,9 @@ pub const REPEATS: usize = 4;
 
 /// The fold of each row of the data set, a list a repeat; `None` for rows that are not among these, and for centres.
 pub fn folds(set: &Dataset, rows: &[usize]) -> Vec<Vec<Option<usize>>> {
-    let mut order: Vec<usize> = rows.iter().copied().filter(|&r| set.poses[r].role != Role::Center).collect();
+    let kept = rows.iter().copied().filter(|&r| set.poses[r].role != Role::Center);
+    let order = by_joints(set, kept.collect());
     let key = |r: usize| (set.poses[r].group, &set.poses[r].joints_rad);
-    order.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
     let poses: Vec<&[usize]> = order.chunk_by(|&a, &b| key(a) == key(b)).collect();
     (1..=REPEATS as u64)
         .map(|repeat| {
@@ -90,16 +91,13 @@ fn mean_of_repeats(errors: Vec<RowError>) -> Option<RowError> {
 mod tests {
     use super::*;
     use crate::identify::synthetic;
+    use crate::measurements::RobotPose;
 
     #[test]
     fn every_row_is_left_out_once_in_each_repeat_and_rows_of_one_pose_together() {
         let mut world = synthetic::world(60, 0.01, 1);
-        let again = world.rows[20].at.joints_deg.clone();
-        world.rows[40].at = crate::measurements::RobotPose {
-            joints_deg: again,
-            group: world.rows[20].at.group.clone(),
-            ..world.rows[40].at.clone()
-        };
+        let RobotPose { joints_deg, group, .. } = world.rows[20].at.clone();
+        world.rows[40].at = RobotPose { joints_deg, group, ..world.rows[40].at.clone() };
         let set = Dataset::new(&world.rows).unwrap();
         let rows = set.fit_rows();
         for of_row in folds(&set, &rows) {

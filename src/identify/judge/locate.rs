@@ -13,9 +13,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use super::placement::Placed;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::Scatter;
+use crate::identify::sensor::{Raw, Scatter};
 use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::Linearised;
@@ -50,9 +49,7 @@ pub struct Trust {
 /// Where everything is.
 #[derive(Debug, Clone)]
 pub struct Located {
-    /// The placements.
     pub placed: Placed,
-    /// How the points agree with the robot.
     pub fit: Fit,
 }
 
@@ -84,7 +81,7 @@ pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -
     let tool = [Parameter::V(0), Parameter::V(1), Parameter::V(2)];
     let extras = set.target_unknowns(oriented);
     let model = if oriented { Model::Pose } else { Model::Position };
-    let with = |parameters| Task { set, robot, parameters, extras, rows: &rows, model, smooth: None, settings };
+    let with = |parameters| Task { extras, model, ..Task::plain(set, robot, parameters, &rows, settings) };
     match fitted(&with(&tool), trust) {
         // Points alone may leave open what the file says.
         Err(Error::Open { .. } | Error::TooFew { .. } | Error::NothingDetermined { .. }) if !oriented => {
@@ -107,7 +104,7 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
         hidden_mm2: 0.0,
         smooth: None,
     };
-    let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+    let load_chain = task.robot.shifted(task.parameters, &offsets);
     formulation.rows = task.rows_at(scatter, &load_chain);
     if let Some(direction) = open_direction(&formulation.rows, &offsets, task.parameters.len()) {
         return Err(Error::Open { direction });
@@ -150,14 +147,9 @@ fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> (f64, usize, f64) {
         let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
         at.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
     }
-    let raw = rows.raw(&at);
-    let squares: Vec<f64> = raw
-        .iter()
-        .filter_map(|(_, _, raw)| match raw {
-            Raw::Point(off, _) => Some(off.norm_squared()),
-            _ => None,
-        })
-        .collect();
+    let square =
+        |(_, _, raw): (usize, f64, Raw)| if let Raw::Point(off, _) = raw { Some(off.norm_squared()) } else { None };
+    let squares: Vec<f64> = rows.raw(&at).into_iter().filter_map(square).collect();
     let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
     (chi_square, (3 * squares.len()).saturating_sub(unknowns), rms)
 }

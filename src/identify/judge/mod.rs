@@ -3,7 +3,6 @@
 pub mod cross_validation;
 pub mod errors;
 pub mod folds;
-pub mod held_out;
 pub mod locate;
 pub mod placement;
 pub mod recheck;

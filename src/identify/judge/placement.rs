@@ -77,7 +77,8 @@ pub struct Placed {
     /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of smooth errors.
     pub fresh_mm2: f64,
     kinematics: Kinematics,
-    robot: Robot,
+    /// The robot that was found.
+    pub robot: Robot,
     offsets: Vec<f64>,
     extras: Vec<Extra>,
     /// Of the shared offsets, then six numbers a group.
@@ -99,8 +100,8 @@ impl Placed {
     ) -> Option<Placed> {
         let linear = Linearised::new(rows, offsets);
         let (of_robot, of_extras) = rows.split(offsets);
-        let parameters = rows.kinematics.parameters();
-        let robot = rows.kinematics.nominal().shifted(parameters, of_robot);
+        let parameters = &rows.kinematics.parameters;
+        let robot = rows.kinematics.nominal.shifted(parameters, of_robot);
         let (mut groups, mut follows, mut own) = (Vec::new(), Vec::new(), Vec::new());
         let mut turn = None;
         for ((block, unknowns), placement) in rows.blocks.iter().zip(rows.unknowns(offsets)).zip(&linear.placements) {
@@ -133,22 +134,22 @@ impl Placed {
         })
     }
 
-    /// The robot that was found.
-    pub fn robot(&self) -> &Robot {
-        &self.robot
-    }
-
     /// `sensor_from_base` of one of the groups, in their order here.
     pub fn sensor_from_base(&self, index: usize) -> Uncertain {
-        let at = self.offsets.len() + self.extras.len() + 6 * index;
+        let at = self.column(index);
         let covariance = self.covariance.fixed_view::<6, 6>(at, at).into_owned();
         Uncertain { transform: self.groups[index].1, covariance }
+    }
+
+    /// Where the six numbers of a group begin in the covariance.
+    fn column(&self, index: usize) -> usize {
+        self.offsets.len() + self.extras.len() + 6 * index
     }
 
     /// `last_frame_from_target`; numbers that were not found have no variance.
     pub fn target(&self) -> Uncertain {
         let count = self.offsets.len();
-        let parameter = |p| self.kinematics.parameters().iter().position(|q| *q == p);
+        let parameter = |p| self.kinematics.parameters.iter().position(|q| *q == p);
         let extra = |e| self.extras.iter().position(|q| *q == e).map(|k| k + count);
         let place = |k: usize| if k < 3 { extra(Extra::Target(k)) } else { parameter(Parameter::V(k - 3)) };
         let unit = |k: usize| if k < 3 { RAD_PER_MRAD } else { 1.0 };
@@ -173,9 +174,9 @@ impl Placed {
     /// The point, and what it moves by with each unknown of the covariance, at each of these poses: joints (rad), and columns of what the
     /// sensor's readings there have in common.
     fn columns(&self, index: usize, poses: &[(&[f64], Option<&Matrix3xX<f64>>)]) -> Vec<(Point3<f64>, DMatrix<f64>)> {
-        let nominal = self.kinematics.nominal();
+        let nominal = &self.kinematics.nominal;
         let joints: Vec<&[f64]> = poses.iter().map(|(joints, _)| *joints).collect();
-        let kinematics = Kinematics::new(nominal, &self.robot, self.kinematics.parameters(), &joints);
+        let kinematics = Kinematics::new(nominal, &self.robot, &self.kinematics.parameters, &joints);
         let frame = &self.groups[index].1;
         let of_place = |(place, (_, shared)): (Place, &(&[f64], Option<&Matrix3xX<f64>>))| {
             let turned = frame.rotation * place.point_mm.coords;
@@ -186,15 +187,12 @@ impl Placed {
             for (k, extra) in self.extras.iter().enumerate() {
                 columns.fixed_view_mut::<3, 1>(0, robot + k).copy_from(&extra.of_point(&point, *shared));
             }
-            let at = self.offsets.len() + self.extras.len() + 6 * index;
-            columns.fixed_view_mut::<3, 6>(0, at).copy_from(&rigid_columns(&turned));
+            columns.fixed_view_mut::<3, 6>(0, self.column(index)).copy_from(&rigid_columns(&turned));
             (point, columns)
         };
         kinematics.places(&self.offsets, true).into_iter().zip(poses).map(of_place).collect()
     }
-}
 
-impl Placed {
     /// How far off the target is to be expected at the poses of one of the groups: against where the same sensor reads it at such a pose, beside
     /// the noise of a reading that its covariance states.
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {

@@ -18,7 +18,7 @@ use crate::robot::Parameter;
 
 /// Tolerances of the links that are weighed, mm: from the smallest, so many, each so many times the one before.
 const SMALLEST_MM: f64 = 0.02;
-const TOLERANCES: usize = 36;
+const TOLERANCES: i32 = 36;
 const STEP: f64 = 1.25;
 
 /// Standard deviation of the target's place for this, mm: it is mounted by hand, and a place that is right by chance is no proof of the
@@ -60,27 +60,20 @@ impl CommonScale {
             return None;
         }
         let (base, parameters) = (&formulation.base, formulation.parameters());
-        let nominal = formulation.rows.kinematics.nominal();
+        let nominal = &formulation.rows.kinematics.nominal;
         let length = |i: usize| match parameters[i] {
             p @ (Parameter::A(_) | Parameter::D(_) | Parameter::V(_)) => nominal.value(p),
             _ => 0.0,
         };
         let extras = &formulation.rows.extras;
-        let mut longer = DVector::zeros(base.rank() + extras.len());
-        for k in 0..base.rank() {
-            let of_others = base.dependent.iter().enumerate().map(|(c, &i)| base.coefficients[(k, c)] * length(i));
-            longer[k] = length(base.free[k]) + of_others.sum::<f64>();
-        }
+        let longer = base.coordinates(&(0..parameters.len()).map(length).collect::<Vec<f64>>());
+        let longer = DVector::from_vec(longer).resize_vertically(base.rank() + extras.len(), 0.0);
         let (normal, gradient) = formulation.normal();
-        let all: Vec<Weighed> = (0..TOLERANCES)
-            .filter_map(|step| {
-                let lengths_mm = SMALLEST_MM * STEP.powi(step as i32);
-                let tolerance = Tolerance { lengths_mm, target_mm: MOUNTED_MM, ..formulation.tolerance };
-                let covariance = tolerance.covariance(base, parameters, extras);
-                let before = -0.5 * ((lengths_mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2);
-                Weighed::new(&covariance, &normal, &gradient, &longer, before)
-            })
-            .collect();
+        let weighed = |(lengths_mm, before): (f64, f64)| {
+            let tolerance = Tolerance { lengths_mm, target_mm: MOUNTED_MM, ..formulation.tolerance };
+            Weighed::new(&tolerance.covariance(base, parameters, extras), &normal, &gradient, &longer, before)
+        };
+        let all: Vec<Weighed> = tolerances().filter_map(weighed).collect();
         let found = summed_up(&all, if set.known.is_empty() { "readings" } else { "known distances" });
         (found.sigma.is_finite() && found.log_odds.is_finite()).then_some(found)
     }
@@ -105,6 +98,14 @@ impl CommonScale {
             ),
         }
     }
+}
+
+/// The tolerances that are weighed, mm, and the logarithm of how probable each is before the data.
+fn tolerances() -> impl Iterator<Item = (f64, f64)> {
+    (0..TOLERANCES).map(|step| {
+        let mm = SMALLEST_MM * STEP.powi(step);
+        (mm, -0.5 * ((mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2))
+    })
 }
 
 /// The links' errors under one tolerance.
@@ -196,14 +197,10 @@ mod tests {
         let longer = DVector::from_row_slice(&lengths);
         let normal = DMatrix::<f64>::identity(5, 5) * 1e4;
         let gradient = DVector::from_fn(5, |k, _| -1e4 * (errors[k] + share * lengths[k]));
-        let all: Vec<Weighed> = (0..TOLERANCES)
-            .map(|step| {
-                let mm = SMALLEST_MM * STEP.powi(step as i32);
-                let before = -0.5 * ((mm / USUAL_MM).ln() / GIVE_OR_TAKE.ln()).powi(2);
-                let covariance = DMatrix::<f64>::identity(5, 5) * mm * mm;
-                Weighed::new(&covariance, &normal, &gradient, &longer, before).unwrap()
-            })
-            .collect();
+        let weighed = |(mm, before): (f64, f64)| {
+            Weighed::new(&(DMatrix::identity(5, 5) * mm * mm), &normal, &gradient, &longer, before).unwrap()
+        };
+        let all: Vec<Weighed> = tolerances().map(weighed).collect();
         summed_up(&all, "readings")
     }
 

@@ -48,13 +48,10 @@ impl Strays {
     }
 }
 
-fn size_mm(error: &RowError) -> Option<f64> {
-    error.point_mm.map(|p| p.norm()).or(error.distance_mm.map(f64::abs))
-}
-
 /// Errors of these rows by their rows, with the sensor placed by those nearest.
 fn sizes(judge: &Judge, robot: &Robot, placing: &[usize], rows: &[usize]) -> Vec<(usize, f64)> {
     let judge = Judge { fitted: placing, ..judge.clone() };
+    let size_mm = |error: &RowError| error.point_mm.map(|p| p.norm()).or(error.distance_mm.map(f64::abs));
     judge.errors(robot, rows).iter().filter_map(|error| Some((error.row, size_mm(error)?))).collect()
 }
 
@@ -64,10 +61,10 @@ fn nearest(judge: &Judge, robot: &Robot) -> Vec<usize> {
     for _ in 0..ROUNDS {
         let mut all = sizes(judge, robot, &placing, judge.fitted);
         all.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let order: Vec<usize> = all.iter().map(|(row, _)| *row).collect();
         let mut near = Vec::new();
         for group in 0..judge.set.groups.len() {
-            let of_group: Vec<usize> =
-                all.iter().map(|(row, _)| *row).filter(|&row| judge.set.poses[row].group == group).collect();
+            let of_group = judge.set.of_group(&order, group);
             let spare = if of_group.len() < FEWEST { 0 } else { of_group.len() / SHARE };
             near.extend(&of_group[..of_group.len() - spare]);
         }

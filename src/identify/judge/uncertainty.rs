@@ -98,11 +98,11 @@ impl Expected {
     pub fn at(formulation: &Formulation, set: &Dataset, fitted: &[usize], rows: &[usize]) -> Expected {
         let joints: Vec<&[f64]> = set.poses.iter().map(|p| p.joints_rad.as_slice()).collect();
         let kinematics = &formulation.rows.kinematics;
-        let nominal = kinematics.nominal();
+        let nominal = &kinematics.nominal;
         let offsets = formulation.offsets_of();
-        let count = kinematics.parameters().len();
-        let robot = nominal.shifted(kinematics.parameters(), &offsets[..count]);
-        let places = Kinematics::new(nominal, &robot, kinematics.parameters(), &joints).places(&offsets[..count], true);
+        let count = kinematics.parameters.len();
+        let robot = nominal.shifted(&kinematics.parameters, &offsets[..count]);
+        let places = Kinematics::new(nominal, &robot, &kinematics.parameters, &joints).places(&offsets[..count], true);
         let covariance = formulation.whole_covariance();
         let times = times_without(formulation, set);
         let scatter_mm2 = formulation.rows.scatter.fresh_mm2();
@@ -110,16 +110,15 @@ impl Expected {
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
         let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
         for group in 0..set.groups.len() {
-            let placing: Vec<usize> = fitted.iter().copied().filter(|&i| set.poses[i].group == group).collect();
             let motion = |i: usize| rigid_columns(&places[i].point_mm.coords);
             let mut normal = DMatrix::zeros(count + 6, count + 6);
-            for &i in &placing {
+            for i in set.of_group(fitted, group) {
                 let mut columns = places[i].point_columns.clone().resize_horizontally(count + 6, 0.0);
                 columns.fixed_columns_mut::<6>(count).copy_from(&motion(i));
                 normal += columns.tr_mul(&columns);
             }
             let Eliminated { follow, inverse, .. } = Eliminated::new(&normal, count);
-            for i in (0..places.len()).filter(|&i| set.poses[i].group == group) {
+            for i in set.rows(|pose| pose.group == group) {
                 let columns = &places[i].point_columns - motion(i) * &follow;
                 let of_robot = (&columns * &covariance * columns.transpose()).trace();
                 // The placement itself is found through the scatter of the rows it is fitted to.
@@ -141,6 +140,14 @@ impl Expected {
             joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),
         }
+    }
+
+    /// What it comes to.
+    pub fn sentence(&self) -> String {
+        format!(
+            "expected position error after a rigid fit: {:.4} mm on average, {:.4} mm at the worst pose, 95 % below {:.4} mm",
+            self.mean_mm, self.max_mm, self.p95_mm
+        )
     }
 }
 
@@ -167,13 +174,9 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     for placement in Linearised::new(&rows, &offsets[..count]).placements {
         let Eliminated { follow, inverse, .. } = placement.eliminated();
         let columns = &placement.linear.jacobian - &placement.linear.design * follow;
-        for place in 0..rows.rows.len() {
-            let of_row: Vec<usize> =
-                (0..placement.poses.len()).filter(|&k| placement.poses[k] == Some(place)).collect();
-            if of_row.is_empty() {
-                continue;
-            }
-            let (columns, own) = (columns.select_rows(&of_row), placement.linear.design.select_rows(&of_row));
+        for (place, at) in placement.by_pose() {
+            let of_row = |all: &DMatrix<f64>| all.rows(at.start, at.len()).into_owned();
+            let (columns, own) = (of_row(&columns), of_row(&placement.linear.design));
             let predicted = &columns * &covariance * columns.transpose() + &own * &inverse * own.transpose();
             let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
             let without = shares.map(|share| share / (1.0 - share)).sum();
@@ -185,31 +188,20 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     times
 }
 
-impl Expected {
-    /// What it comes to.
-    pub fn sentence(&self) -> String {
-        format!(
-            "expected position error after a rigid fit: {:.4} mm on average, {:.4} mm at the worst pose, 95 % below {:.4} mm",
-            self.mean_mm, self.max_mm, self.p95_mm
-        )
-    }
-}
-
 /// From where to where each joint was read, deg (mm where it slides).
 fn ranges(set: &Dataset) -> Vec<[f64; 2]> {
-    let count = set.poses.first().map_or(0, |p| p.joints_rad.len());
     let range = |j: usize| {
         let values = set.poses.iter().map(|p| p.joints_rad[j]);
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-        if set.slides.get(j) == Some(&true) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
+        if set.is_sliding(j) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
     };
-    (0..count).map(range).collect()
+    (0..set.joint_count()).map(range).collect()
 }
 
 /// The ranges of the joints that were measured, for a person.
 pub fn region(set: &Dataset) -> String {
     let of_joint = |(j, [low, high]): (usize, [f64; 2])| {
-        let unit = if set.slides.get(j) == Some(&true) { "mm" } else { "deg" };
+        let unit = if set.is_sliding(j) { "mm" } else { "deg" };
         format!("j{} {:.0}..{:.0} {unit}", j + 1, low.round() + 0.0, high.round() + 0.0)
     };
     ranges(set).into_iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")

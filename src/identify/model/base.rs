@@ -70,12 +70,17 @@ impl Base {
         let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
         let threshold = tolerance * norms.iter().copied().fold(0.0, f64::max);
         let (zero, alive): (Vec<usize>, Vec<usize>) = (0..n).partition(|&i| norms[i] <= threshold);
-        let mut work = DMatrix::from_fn(jacobian.nrows(), alive.len(), |r, c| jacobian[(r, alive[c])]);
+        let mut work = jacobian.select_columns(&alive);
         let (order, rank) = pivoted(&mut work, threshold);
         let mut free: Vec<usize> = order[..rank].iter().map(|&c| alive[c]).collect();
-        let mut dependent: Vec<usize> = order[rank..].iter().map(|&c| alive[c]).collect();
         free.sort_unstable();
-        dependent.sort_unstable();
+        Base::of_free(jacobian, free, zero)
+    }
+
+    /// With these base parameters.
+    fn of_free(jacobian: &DMatrix<f64>, free: Vec<usize>, zero: Vec<usize>) -> Base {
+        let is_dependent = |i: &usize| !free.contains(i) && !zero.contains(i);
+        let dependent: Vec<usize> = (0..jacobian.ncols()).filter(is_dependent).collect();
         let coefficients = combinations(jacobian, &free, &dependent);
         let singular_values = singular_values(jacobian, &free);
         Base { free, zero, dependent, coefficients, singular_values }
@@ -101,11 +106,7 @@ impl Base {
             }
             kept.remove(worst.1);
         }
-        let dependent: Vec<usize> =
-            (0..jacobian.ncols()).filter(|i| !kept.contains(i) && !reference.zero.contains(i)).collect();
-        let coefficients = combinations(jacobian, &kept, &dependent);
-        let singular_values = singular_values(jacobian, &kept);
-        Base { free: kept, zero: reference.zero, dependent, coefficients, singular_values }
+        Base::of_free(jacobian, kept, reference.zero)
     }
 
     /// The base parameters of a robot whose parameters are off by these.
@@ -182,16 +183,12 @@ fn pivoted(work: &mut DMatrix<f64>, threshold: f64) -> (Vec<usize>, usize) {
     (order, n.min(m))
 }
 
-fn columns(jacobian: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(jacobian.nrows(), which.len(), |r, c| jacobian[(r, which[c])])
-}
-
 fn combinations(jacobian: &DMatrix<f64>, free: &[usize], dependent: &[usize]) -> DMatrix<f64> {
     if free.is_empty() || dependent.is_empty() {
         return DMatrix::zeros(free.len(), dependent.len());
     }
-    let qr = columns(jacobian, free).qr();
-    let mut rhs = columns(jacobian, dependent);
+    let qr = jacobian.select_columns(free).qr();
+    let mut rhs = jacobian.select_columns(dependent);
     qr.q_tr_mul(&mut rhs);
     let top = rhs.rows(0, free.len()).into_owned();
     qr.r().solve_upper_triangular(&top).unwrap_or_else(|| DMatrix::zeros(free.len(), dependent.len()))
@@ -201,7 +198,7 @@ fn singular_values(jacobian: &DMatrix<f64>, free: &[usize]) -> Vec<f64> {
     if free.is_empty() {
         return Vec::new();
     }
-    let reduced = columns(jacobian, free).qr().r();
+    let reduced = jacobian.select_columns(free).qr().r();
     let mut values: Vec<f64> = reduced.singular_values().iter().copied().collect();
     values.sort_by(|a, b| b.total_cmp(a));
     values

@@ -13,8 +13,10 @@ use crate::robot::{Joint, Parameter, Robot};
 /// A robot at fixed commanded poses with chosen parameters free.
 #[derive(Debug, Clone)]
 pub struct Kinematics {
-    nominal: Robot,
-    parameters: Vec<Parameter>,
+    /// The robot whose parameters are offset.
+    pub nominal: Robot,
+    /// The free parameters.
+    pub parameters: Vec<Parameter>,
     poses: Vec<PoseConstants>,
 }
 
@@ -41,6 +43,11 @@ pub struct Place {
     pub rotation_columns: Matrix3xX<f64>,
 }
 
+/// Number of columns of these places.
+pub fn column_count(places: &[Place]) -> usize {
+    places.first().map_or(0, |place| place.point_columns.ncols())
+}
+
 impl Kinematics {
     /// `joints_rad`: one vector of commanded angles a pose, of the robot's joint count.
     /// Weights have their levers on the chain of `load_chain`.
@@ -63,16 +70,6 @@ impl Kinematics {
         Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), poses }
     }
 
-    /// The free parameters.
-    pub fn parameters(&self) -> &[Parameter] {
-        &self.parameters
-    }
-
-    /// The robot whose parameters are offset.
-    pub fn nominal(&self) -> &Robot {
-        &self.nominal
-    }
-
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
         let robot = self.nominal.shifted(&self.parameters, offsets);
@@ -81,10 +78,10 @@ impl Kinematics {
         let place = |pose: &PoseConstants| {
             self.bend(&robot, pose, offsets, &mut bent);
             if derivatives {
-                self.with_columns(&robot, &links, pose, &bent)
-            } else {
-                without_columns(&robot, &links, &bent)
+                return self.with_columns(&robot, &links, pose, &bent);
             }
+            let (rotation, point_mm) = links.end(&bent, &robot.tool_mm);
+            Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
         };
         self.poses.iter().map(place).collect()
     }
@@ -120,9 +117,4 @@ impl Kinematics {
             rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
         }
     }
-}
-
-fn without_columns(robot: &Robot, links: &Links, bent: &Bent) -> Place {
-    let (rotation, point_mm) = links.end(bent, &robot.tool_mm);
-    Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
 }

@@ -6,7 +6,6 @@ use crate::robot::{Parameter, Robot};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Chain {
-    /// Nothing.
     Nominal,
     /// The target point.
     Tool,

@@ -54,22 +54,6 @@ pub struct Tolerance {
     pub warps_per_mille: f64,
 }
 
-impl Default for Tolerance {
-    /// Loose: a start for the search.
-    fn default() -> Tolerance {
-        Tolerance {
-            lengths_mm: 10.0,
-            angles_mrad: 10.0,
-            target_mm: 1000.0,
-            gravity_mrad_per_m: 1.0,
-            harmonics_mrad: 1.0,
-            couplings_per_mille: 1.0,
-            zero_mm: 1.0,
-            warps_per_mille: 1.0,
-        }
-    }
-}
-
 fn kind(parameter: Parameter) -> usize {
     match parameter {
         Parameter::A(_) | Parameter::D(_) => 0,
@@ -90,6 +74,18 @@ fn extra_kind(extra: Extra) -> Option<usize> {
 }
 
 impl Tolerance {
+    /// Loose: a start for the search.
+    pub const START: Tolerance = Tolerance {
+        lengths_mm: 10.0,
+        angles_mrad: 10.0,
+        target_mm: 1000.0,
+        gravity_mrad_per_m: 1.0,
+        harmonics_mrad: 1.0,
+        couplings_per_mille: 1.0,
+        zero_mm: 1.0,
+        warps_per_mille: 1.0,
+    };
+
     fn kinds(&mut self) -> [&mut f64; KINDS] {
         [
             &mut self.lengths_mm,
@@ -194,10 +190,8 @@ impl Tolerance {
 /// Data that are linear in the base parameters and extras.
 #[derive(Debug, Clone, Copy)]
 pub struct Likelihood<'a> {
-    /// The base parameters.
     pub base: &'a Base,
     pub parameters: &'a [Parameter],
-    /// Unknowns of the sensor.
     pub extras: &'a [Extra],
     /// The product of the white Jacobian with itself.
     pub normal: &'a DMatrix<f64>,
@@ -246,7 +240,7 @@ fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
 
 fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tolerance) -> f64) -> (Tolerance, f64) {
     let present = presence(parameters, extras);
-    let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::default() };
+    let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::START };
     let from = |start: Tolerance| {
         let mut best = (start, score(&start));
         for _ in 0..ROUNDS {
@@ -335,7 +329,7 @@ mod tests {
     fn a_group_has_the_variance_of_its_sum() {
         let parameters = [Parameter::D(1), Parameter::D(2), Parameter::D(3)];
         let base = Base::new(&DMatrix::from_element(2, 3, 1.0), 1e-9);
-        let tolerance = Tolerance { lengths_mm: 2.0, ..Tolerance::default() };
+        let tolerance = Tolerance { lengths_mm: 2.0, ..Tolerance::START };
         assert!((tolerance.covariance(&base, &parameters, &[])[(0, 0)] - 12.0).abs() < 1e-12);
         // Equal tolerances share a correction equally.
         let spread = tolerance.spread(&base, &parameters);

@@ -1,18 +1,19 @@
 //! Whether to use the robot that was found, and the warnings in the order of their weight.
 
+use nalgebra::Point3;
+
 use super::file::Record;
 use super::findings::{self, Findings};
 use super::gather;
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
 use super::rounded;
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::still::constant_joints;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
 use crate::identify::judge::locate::REPEATABILITY_MM;
-use crate::identify::run::Against;
-use crate::identify::run::Identification;
+use crate::identify::run::{Against, Identification};
 use crate::robot::{Advice, Robot};
 
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
@@ -42,7 +43,7 @@ impl Record {
         rows: Against,
     ) {
         let worse = self.worse(rows);
-        let kept = found.candidates[found.chosen].found.is_none().then(|| self.kept_nominal(found));
+        let kept = found.formulation().is_none().then(|| self.kept_nominal(found));
         let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
         // Points that nobody measured say nothing of a robot, whatever else is odd about them.
         let computed = || self.computed(set).or_else(|| self.predicted(set, nominal));
@@ -74,11 +75,7 @@ impl Record {
     /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is left once it is
     /// solved counts.
     fn implausible(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
-        let (joints, points) = gather::most_points(set);
-        let before = match self.tool_mm {
-            Some((_, left)) => Some(left),
-            None => nominal.left_mm(&joints, &points).or(self.before.judged().distance.mean_abs_mm),
-        };
+        let before = self.with_tool_mm(set, nominal).or(self.before.judged().distance.mean_abs_mm);
         let before = before.filter(|&off| off > IMPLAUSIBLE_MM)?;
         Some(format!(
             "the nominal robot is off by {before:.0} mm in the middle of the rows, which is implausible for a real robot: check that the lengths \
@@ -92,18 +89,14 @@ impl Record {
         /// instrument read the points of one to two micrometres, whatever is printed.
         const PRINTED_MM: f64 = 0.01;
         const READ_MM: f64 = 0.001;
-        let rows = set.rows(|p| matches!(p.reading, Reading::Position { .. }));
-        let is_printed = |&row: &usize| match set.poses[row].reading {
-            Reading::Position { point_mm, .. } => {
-                point_mm.iter().all(|v| (v / PRINTED_MM - (v / PRINTED_MM).round()).abs() < 1e-5)
-            }
-            _ => true,
-        };
-        let limit_mm = 2.0 * if rows.iter().all(is_printed) { PRINTED_MM } else { READ_MM };
+        let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
+        let is_printed = |v: &f64| (v / PRINTED_MM - (v / PRINTED_MM).round()).abs() < 1e-5;
+        let limit_mm =
+            2.0 * if points.iter().flat_map(|point| point.iter()).all(is_printed) { PRINTED_MM } else { READ_MM };
         let largest = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.max_abs_mm);
         let held_out_mm = largest(self.chosen_method().map_or(&self.before, |method| &method.quality).judged())?;
         // What is left where the numbers are twice the unknowns is no better for being fitted, and free of what rounding does to rows left out.
-        let redundant = |m: &&MethodRecord| 3 * rows.len() >= 2 * (m.parameters.len() + 6 * set.groups.len());
+        let redundant = |m: &&MethodRecord| 3 * points.len() >= 2 * (m.parameters.len() + 6 * set.groups.len());
         let left_mm = self.chosen_method().filter(redundant).and_then(|method| largest(&method.quality.fit));
         let largest_mm = held_out_mm.min(left_mm.unwrap_or(f64::INFINITY));
         if largest_mm >= limit_mm {
@@ -167,18 +160,14 @@ impl Record {
 
     /// Parameters whose search ended at its limit.
     fn at_limit(&self, found: &Identification) -> Option<String> {
-        let reached: Vec<&str> = self
-            .chosen_method()
-            .filter(|_| found.candidates[found.chosen].found.is_some())
-            .map(|m| m.parameters.iter().filter(|p| p.at_bound).map(|p| p.name.as_str()).collect())
-            .unwrap_or_default();
-        let list = reached.join(", ");
-        (!reached.is_empty()).then(|| format!("{list} reached the search limit: the best value may lie beyond it"))
+        let chosen = self.chosen_method().filter(|_| found.formulation().is_some())?;
+        let reached = chosen.parameters.iter().filter(|p| p.at_bound).map(|p| p.name.as_str());
+        let list = reached.collect::<Vec<&str>>().join(", ");
+        (!list.is_empty()).then(|| format!("{list} reached the search limit: the best value may lie beyond it"))
     }
 
     fn zero_of_readings(&self, found: &Identification) -> Option<String> {
-        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
-        let zero_mm = formulation.zero_sigma_mm().unwrap_or(0.0);
+        let zero_mm = found.formulation()?.zero_sigma_mm().unwrap_or(0.0);
         let expected_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.of_robot_mm);
         (zero_mm > expected_mm && findings::zero(found).is_none()).then(|| {
             format!(
@@ -210,9 +199,9 @@ impl Record {
             ));
         }
         if !i.weak.is_empty() {
+            let weak = i.weak.join(", ");
             list.push(format!(
-                "the data hardly determine {}: the correction comes from the manufacturing tolerance",
-                i.weak.join(", ")
+                "the data hardly determine {weak}: the correction comes from the manufacturing tolerance"
             ));
         }
         if !self.widened.is_empty() {
@@ -220,10 +209,8 @@ impl Record {
             let sum_of = |name: &String| {
                 i.dependent.iter().find(|sum| sum.split(' ').next() == Some(name)).unwrap_or(name).clone()
             };
-            list.push(format!(
-                "far from nominal: {}; the search limits were widened",
-                self.widened.iter().map(sum_of).collect::<Vec<String>>().join(", ")
-            ));
+            let far = self.widened.iter().map(sum_of).collect::<Vec<String>>().join(", ");
+            list.push(format!("far from nominal: {far}; the search limits were widened"));
         }
         list
     }
@@ -272,7 +259,7 @@ impl Record {
 
 /// Several joints that did not move.
 fn still(set: &Dataset) -> Option<String> {
-    let joints: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
+    let joints = constant_joints(set);
     (joints.len() > 1).then(|| {
         format!(
             "joints {} did not move: the identified robot is right for these readings of theirs only; move every joint between poses",

@@ -32,11 +32,9 @@ pub struct Record {
     /// Why methods were not run that were to be compared.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub not_run: Option<String>,
-    /// What the poses determine.
     pub identifiability: Identifiability,
     /// Whether to use the robot that was found.
     pub advice: Advice,
-    /// Why, in one sentence.
     pub reason: String,
     /// In plain words, the gravest first.
     pub warnings: Vec<String>,
@@ -46,7 +44,6 @@ pub struct Record {
     /// Poses to verify that fit far worse than the rest and by which nothing is judged.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub strays: Vec<String>,
-    /// Sessions found along the rows.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sessions: Vec<Session>,
     /// The rows that were given, by which they are known again.
@@ -107,9 +104,8 @@ pub struct Smooth {
 impl Smooth {
     /// Of the chosen fit.
     pub fn new(found: &Identification) -> Option<Smooth> {
-        let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
-        let error = formulation.rows.scatter.smooth?;
-        Some(Smooth { error, left_mm: formulation.rows.left_by_smooth_mm2().sqrt() })
+        let rows = &found.formulation()?.rows;
+        Some(Smooth { error: rows.scatter.smooth?, left_mm: rows.left_by_smooth_mm2().sqrt() })
     }
 }
 

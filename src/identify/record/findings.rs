@@ -1,6 +1,6 @@
 //! What was found along the way, each in words with the rows it is about and what was done.
 
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
@@ -45,14 +45,13 @@ impl Findings {
             || (left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM).then(|| conventions::unexplained(left_mm));
         let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
-        let left_out = left_out::of_a_joint(set, found);
-        let is_still = left_out.as_ref().is_some_and(|left_out| left_out.is_still);
-        let (of_still, of_end) = if is_still { (left_out, None) } else { (None, left_out) };
+        let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers);
+        let (of_still, of_end): (Vec<_>, Vec<_>) = left_out.into_iter().partition(|left_out| left_out.is_still);
         let rounded = rounded::of_joints(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let against: Vec<Finding> = of_still
-            .map(|left_out| left_out.finding)
             .into_iter()
+            .map(|left_out| left_out.finding)
             .chain(of_rounding)
             .chain(unexplained)
             .chain(plausible::of_another_robot(found))
@@ -63,7 +62,7 @@ impl Findings {
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
-        let of_rows = of_end.map(|left_out| left_out.finding).into_iter().chain(rounded);
+        let of_rows = of_end.into_iter().map(|left_out| left_out.finding).chain(rounded);
         let terms = plausible::of_terms(found);
         let doubts = examined
             .into_iter()
@@ -85,19 +84,13 @@ impl Findings {
 /// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it.
 pub fn is_explained(found: &Identification) -> bool {
     let few_left_out = found.outliers.len() * 10 <= found.fitted.len();
-    found.candidates[found.chosen].found.is_some()
-        && few_left_out
-        && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
+    found.formulation().is_some() && few_left_out && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
 }
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
-    let mut list = of_rows(set, found);
-    list.extend(plausible::of_another_robot(found));
-    list.extend(of_sensor(found));
-    list.extend(along_the_rows(along));
-    list.extend(of_data(set, found));
-    list
+    let of_fit = of_rows(set, found).into_iter().chain(plausible::of_another_robot(found));
+    of_fit.chain(of_sensor(found)).chain(along_the_rows(along)).chain(of_data(set, found)).collect()
 }
 
 /// Rows that do not fit with the others.
@@ -142,14 +135,13 @@ fn of_verify(set: &Dataset, found: &Identification) -> Option<Finding> {
 /// Errors that the readings share.
 fn of_sensor(found: &Identification) -> Vec<Finding> {
     let mut list = Vec::new();
-    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
+    let mut add = |finding: String, action: &str| list.push(Finding::new(finding, action));
     if let Some((zero_mm, sigma_mm)) = zero(found) {
         let (size, way) = (zero_mm.abs(), if zero_mm > 0.0 { "long" } else { "short" });
         add(
             format!(
                 "the distances are {size:.3} mm too {way} (known to {sigma_mm:.3} mm): the zero of the readings is off"
             ),
-            Vec::new(),
             "it was found with the robot and taken off there; the figures below, as those of `verify`, hold the distances as they were read",
         );
     }
@@ -162,7 +154,6 @@ fn of_sensor(found: &Identification) -> Vec<Finding> {
                 smooth.left_mm,
                 rounded(smooth.error.length_mm)
             ),
-            Vec::new(),
             "it is treated as one error of each placement, and the expected accuracy allows for it; more placements reduce it",
         );
     }
@@ -180,8 +171,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
             "a micrometre was added to each coordinate",
         );
     }
-    let oriented =
-        set.poses.iter().filter(|p| matches!(p.reading, Reading::Position { rotation_rad: Some(_), .. })).count();
+    let oriented = set.poses.iter().filter(|pose| pose.reading.rotation_rad().is_some()).count();
     if oriented > 0 && !set.has_rotations() {
         let count = set.poses.len();
         add(
@@ -192,24 +182,23 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
             "the points alone are used; measure the orientation of all poses, or of none",
         );
     }
-    if let Some((names, finding)) = repeated(set) {
-        add(finding, names, "all of them are used");
+    let names = repeated(set);
+    if !names.is_empty() {
+        let finding = "poses that the robot came back to: they say how well it repeats, and nothing about its links";
+        add(finding.to_owned(), names, "all of them are used");
     }
-    let constant: Vec<String> = constant_joints(set).into_iter().map(|joint| (joint + 1).to_string()).collect();
-    if !constant.is_empty() {
-        add(
-            match &constant[..] {
-                [one] => {
-                    format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'")
-                }
-                all => format!(
-                    "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
-                    all.join(", ")
-                ),
-            },
-            Vec::new(),
-            "move every joint between poses",
-        );
+    let constant = match &constant_joints(set)[..] {
+        [] => None,
+        [one] => {
+            Some(format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'"))
+        }
+        all => Some(format!(
+            "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
+            all.join(", ")
+        )),
+    };
+    if let Some(finding) = constant {
+        add(finding, Vec::new(), "move every joint between poses");
     }
     if let Some(finding) = stated_covariances(set, found) {
         add(finding, Vec::new(), "the fit uses the scatter that it found");
@@ -229,8 +218,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
 
 /// Sessions and drifts.
 pub fn along_the_rows(along: &Along) -> Vec<Finding> {
-    let mut list = Vec::new();
-    list.extend(along.robots.clone());
+    let mut list: Vec<Finding> = along.robots.iter().cloned().collect();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     let drifts = |s: &Session| along.drifting.contains(&s.group);
     let ranges = |of: &dyn Fn(&&Session) -> bool| -> Vec<String> {
@@ -276,7 +264,7 @@ const ZERO_SIGMAS: f64 = 4.0;
 /// The zero of distances to a centre and its standard deviation, mm, where it is off.
 pub fn zero(found: &Identification) -> Option<(f64, f64)> {
     let k = found.extras.iter().position(|(extra, _)| *extra == Extra::Zero)?;
-    let (formulation, _) = found.candidates[found.chosen].found.as_ref()?;
+    let formulation = found.formulation()?;
     let at = formulation.base.rank() + k;
     let (value, sigma) = (found.extras[k].1, formulation.covariance()[(at, at)].max(0.0).sqrt());
     (value.abs() > ZERO_SIGMAS * sigma).then_some((value, sigma))

@@ -7,7 +7,7 @@ use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
 use super::quality::quality;
 use super::touched::Touched;
-use crate::identify::data::dataset::{Dataset, Reading};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::sessions::Along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
@@ -36,10 +36,10 @@ impl Record {
         settings: &Settings,
         seed: u64,
     ) -> Record {
-        let chosen = &found.candidates[found.chosen];
+        let (chosen, formulation) = (&found.candidates[found.chosen], found.formulation());
         // Nominal has nothing to say about what the poses determine; the fit that it was kept against has.
         let fitted = chosen.found.as_ref().or(found.candidates.first().and_then(|c| c.found.as_ref()));
-        let identifiability = fitted.map_or_else(Identifiability::nothing, |(f, _)| parameters::identifiability(f));
+        let identifiability = fitted.map_or_else(Identifiability::default, |(f, _)| parameters::identifiability(f));
         let methods: Vec<MethodRecord> = found
             .candidates
             .iter()
@@ -65,13 +65,13 @@ impl Record {
             judged: found.judged.clone(),
             smooth: Smooth::new(found),
             scatter_mm: found.scatter.point_mm,
-            scatter_rad: (chosen.model == Model::Pose && chosen.found.is_some()).then_some(found.scatter.rotation_rad),
-            widened: chosen.found.as_ref().map_or_else(Vec::new, |(f, _)| f.widened.clone()),
+            scatter_rad: (chosen.model == Model::Pose && formulation.is_some()).then_some(found.scatter.rotation_rad),
+            widened: formulation.map_or_else(Vec::new, |f| f.widened.clone()),
             prior: fitted.filter(|(f, _)| f.held).map(|(f, _)| f.tolerance),
             doctor: findings.all(),
-            covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f, &f.robot_covariance())),
-            whole_covariance: chosen.found.as_ref().map(|(f, _)| Covariance::new(f, &f.whole_covariance())),
-            expected: chosen.found.as_ref().map(|(f, _)| Expected::new(f, set, &found.fitted)),
+            covariance: formulation.map(|f| Covariance::new(f, &f.robot_covariance())),
+            whole_covariance: formulation.map(|f| Covariance::new(f, &f.whole_covariance())),
+            expected: formulation.map(|f| Expected::new(f, set, &found.fitted)),
             scale: found.scale(set),
             targets: set.targets.clone().map(|targets| targets.solved(&found.extras)),
             repeats: set.repeats.clone(),
@@ -103,9 +103,6 @@ fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
 pub(super) fn most_points(set: &Dataset) -> (Vec<Vec<f64>>, Vec<Point3<f64>>) {
     let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
     let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
-    let point = |&r: &usize| match set.poses[r].reading {
-        Reading::Position { point_mm, .. } => Some((set.poses[r].joints_rad.clone(), point_mm)),
-        _ => None,
-    };
+    let point = |&r: &usize| Some((set.poses[r].joints_rad.clone(), set.poses[r].reading.point_mm()?));
     rows.iter().filter_map(point).unzip()
 }

@@ -6,7 +6,6 @@
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
-use crate::identify::run::Identification;
 
 /// Share of a joint's way within which it is where it was.
 const SAME: f64 = 1e-3;
@@ -29,8 +28,12 @@ pub struct LeftOut {
 }
 
 /// The joint whose rows were left out, if they are one joint's.
-pub fn of_a_joint(set: &Dataset, found: &Identification) -> Option<LeftOut> {
-    of_rows(&Rows { set, fitted: &found.fitted, outliers: &found.outliers })
+pub fn of_a_joint(set: &Dataset, fitted: &[usize], outliers: &[usize]) -> Option<LeftOut> {
+    let (rows, joints) = (Rows { set, fitted, outliers }, set.joint_count());
+    let tests = 3 * joints;
+    let moving = (0..joints).filter_map(|joint| moves(&rows, joint, tests));
+    let at_an_end = || (0..joints).find_map(|joint| beyond(&rows, joint, tests));
+    moving.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, left_out)| left_out).or_else(at_an_end)
 }
 
 /// The rows that were fitted and those that were left out.
@@ -38,15 +41,6 @@ struct Rows<'a> {
     set: &'a Dataset,
     fitted: &'a [usize],
     outliers: &'a [usize],
-}
-
-fn of_rows(rows: &Rows) -> Option<LeftOut> {
-    let set = rows.set;
-    let joints = set.poses.first().map_or(0, |pose| pose.joints_rad.len());
-    let tests = 3 * joints;
-    let moving = (0..joints).filter_map(|joint| moves(rows, joint, tests));
-    let at_an_end = || (0..joints).filter_map(|joint| beyond(rows, joint, tests)).next();
-    moving.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, left_out)| left_out).or_else(at_an_end)
 }
 
 /// All rows and those left out, by a joint's reading.
@@ -98,10 +92,7 @@ fn beyond(of: &Rows, joint: usize, tests: usize) -> Option<LeftOut> {
     }
     let kept = all.iter().filter(|(_, out, _)| !out).map(|(q, ..)| *q);
     let end = if way == "below" { kept.fold(f64::INFINITY, f64::min) } else { kept.fold(f64::NEG_INFINITY, f64::max) };
-    let (end, unit) = match of.set.slides.get(joint) {
-        Some(true) => (end, "mm"),
-        _ => (end.to_degrees(), "deg"),
-    };
+    let (end, unit) = if of.set.is_sliding(joint) { (end, "mm") } else { (end.to_degrees(), "deg") };
     let said = format!(
         "every row in which joint {} is {way} {end:.1} {unit} was left out ({}): the robot that was found does not hold there",
         joint + 1,
@@ -136,7 +127,7 @@ mod tests {
         }
         let set = Dataset::new(&world.rows).unwrap();
         let fitted: Vec<usize> = (0..set.poses.len()).filter(|row| !outliers.contains(row)).collect();
-        of_rows(&Rows { set: &set, fitted: &fitted, outliers })
+        of_a_joint(&set, &fitted, outliers)
     }
 
     #[test]

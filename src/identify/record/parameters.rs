@@ -19,7 +19,6 @@ pub struct MethodRecord {
     pub name: &'static str,
     pub model: &'static str,
     pub parameters: Vec<ParameterRecord>,
-    /// Its errors.
     #[serde(flatten)]
     pub quality: Quality,
     /// Root mean square held-out error that the choice went by, mm.
@@ -28,7 +27,6 @@ pub struct MethodRecord {
     pub cost_mm2: Option<f64>,
     pub iterations: usize,
     pub evaluations: usize,
-    /// Why it stopped.
     pub stop: Option<Stop>,
     /// Best cost after each iteration, mm^2.
     pub history: Vec<f64>,
@@ -54,7 +52,7 @@ pub struct ParameterRecord {
 }
 
 /// What the poses determine.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Identifiability {
     /// Number of base parameters.
     pub rank: usize,
@@ -69,20 +67,6 @@ pub struct Identifiability {
     pub observability: Option<Observability>,
     /// Base parameters that the data leave as uncertain as the prior.
     pub weak: Vec<String>,
-}
-
-impl Identifiability {
-    pub(super) fn nothing() -> Identifiability {
-        Identifiability {
-            rank: 0,
-            parameters: 0,
-            zero: Vec::new(),
-            dependent: Vec::new(),
-            condition: None,
-            observability: None,
-            weak: Vec::new(),
-        }
-    }
 }
 
 pub(super) fn identifiability(formulation: &Formulation) -> Identifiability {
@@ -132,7 +116,7 @@ fn parameter_records(formulation: &Formulation, solution: &Solution) -> Vec<Para
         ParameterRecord {
             name: parameter.name(),
             unit,
-            nominal: factor * formulation.rows.kinematics.nominal().value(parameter),
+            nominal: factor * formulation.rows.kinematics.nominal.value(parameter),
             delta: factor * offsets[i],
             sigma: determined.then(|| factor * covariance[(i, i)].max(0.0).sqrt()),
             identifiable: free.is_some(),

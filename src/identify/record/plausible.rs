@@ -74,11 +74,10 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
 
 /// The determined parameters whose correction is beyond its limit, for a sentence.
 fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Option<String> {
-    let candidate = &found.candidates[found.chosen];
-    let (formulation, _) = candidate.found.as_ref()?;
-    let (covariance, nominal) = (formulation.robot_covariance(), formulation.rows.kinematics.nominal());
+    let formulation = found.formulation()?;
+    let (covariance, nominal) = (formulation.robot_covariance(), &formulation.rows.kinematics.nominal);
     let parameters = formulation.parameters();
-    let moved = |p: Parameter| candidate.robot.value(p) - nominal.value(p);
+    let moved = |p: Parameter| found.robot().value(p) - nominal.value(p);
     let base = &formulation.base;
     // What poses determine of a link is the sum of it and what acts like it; terms are nothing else's.
     let sum = |row: usize| {

@@ -63,9 +63,8 @@ pub fn quality(
 ) -> (Quality, Vec<RowError>) {
     // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors; where targets stand is none.
     let of_targets = |extra: &Extra| matches!(extra, Extra::Target(_)) || set.are_on_flange();
-    let of_sensor = found.extras.iter().copied().filter(|(extra, _)| of_targets(extra));
-    let (extras, values): (Vec<Extra>, Vec<f64>) = of_sensor.unzip();
-    let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
+    let extras: Vec<(Extra, f64)> = found.extras.iter().copied().filter(|(extra, _)| of_targets(extra)).collect();
+    let judge = Judge { extras: &extras, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
     let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted));
     let strays = found.strays(set);
     let without_strays = || {

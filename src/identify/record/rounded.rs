@@ -7,7 +7,7 @@
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::finding::Finding;
 use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::record::file::Smooth;
@@ -92,18 +92,15 @@ pub fn as_closely_as_digits(set: &Dataset, found: &Identification) -> Option<Str
 
 /// The step that all angles stand on, deg.
 fn joints_deg(set: &Dataset) -> Option<f64> {
-    let turns = |joint: &usize| !set.slides.get(*joint).copied().unwrap_or(false);
-    let of_pose = |q: &[f64]| (0..q.len()).filter(turns).map(|joint| q[joint].to_degrees()).collect::<Vec<f64>>();
-    step(&set.poses.iter().flat_map(|pose| of_pose(&pose.joints_rad)).collect::<Vec<f64>>())
+    let turning = (0..set.joint_count()).filter(|&joint| !set.is_sliding(joint));
+    let of_joint = |joint: usize| set.poses.iter().map(move |pose| pose.joints_rad[joint].to_degrees());
+    step(&turning.flat_map(of_joint).collect::<Vec<f64>>())
 }
 
 /// The step that all points stand on, mm.
 fn points_mm(set: &Dataset) -> Option<f64> {
-    let of_pose = |reading: &Reading| match reading {
-        Reading::Position { point_mm, .. } => point_mm.iter().copied().collect(),
-        _ => Vec::new(),
-    };
-    step(&set.poses.iter().flat_map(|pose| of_pose(&pose.reading)).collect::<Vec<f64>>())
+    let points = set.poses.iter().filter_map(|pose| pose.reading.point_mm());
+    step(&points.flat_map(|point| <[f64; 3]>::from(point.coords)).collect::<Vec<f64>>())
 }
 
 fn step(numbers: &[f64]) -> Option<f64> {
@@ -113,8 +110,7 @@ fn step(numbers: &[f64]) -> Option<f64> {
 
 /// What angles rounded to a step alone scatter a coordinate by, mm.
 fn of_step_mm(set: &Dataset, found: &Identification, step_deg: f64) -> f64 {
-    let slides = |joint: usize| set.slides.get(joint).copied().unwrap_or(false);
-    let robot = &found.candidates[found.chosen].robot;
+    let robot = found.robot();
     let of_row = |&row: &usize| {
         let q = &set.poses[row].joints_rad;
         let at = robot.target_mm(q);
@@ -123,7 +119,7 @@ fn of_step_mm(set: &Dataset, found: &Identification, step_deg: f64) -> f64 {
             turned[joint] += SMALL_RAD;
             ((robot.target_mm(&turned) - at).norm() / SMALL_RAD).powi(2)
         };
-        (0..q.len()).filter(|&joint| !slides(joint)).map(square).sum::<f64>()
+        (0..q.len()).filter(|&joint| !set.is_sliding(joint)).map(square).sum::<f64>()
     };
     let squares = found.fitted.iter().map(of_row).sum::<f64>() / found.fitted.len().max(1) as f64;
     // A uniform error of a step, over three coordinates.

@@ -115,14 +115,9 @@ mod tests {
                 assert!(off_mm < 20.0 || found.before_mm > 5.0 * found.left_mm, "{off_mm}: {found:?}");
             }
             // One orientation tells nothing.
-            let one = world.rows.iter().map(|row| crate::measurements::Measurement {
-                at: crate::measurements::RobotPose {
-                    joints_deg: world.rows[0].at.joints_deg.clone(),
-                    ..row.at.clone()
-                },
-                ..row.clone()
-            });
-            let set = Dataset::new(&one.collect::<Vec<_>>()).unwrap();
+            let (mut one, joints_deg) = (world.rows.clone(), &world.rows[0].at.joints_deg);
+            one.iter_mut().for_each(|row| row.at.joints_deg.clone_from(joints_deg));
+            let set = Dataset::new(&one).unwrap();
             assert_eq!(Touched::new(&set, &world.nominal), None);
         }
     }

@@ -1,25 +1,22 @@
 //! Distances: to a group's centre pose, or to a fixed point that is unknown (a draw wire's anchor).
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Vector3};
 
 use crate::geometry::direction;
-use crate::identify::model::kinematics::Place;
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::{Length, Scatter};
+use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::sensor::{Length, Raw, Scatter};
 
 /// Distances to the group's centre pose.
 #[derive(Debug, Clone)]
 pub struct Center {
     /// Index of the centre among the places.
     pub center: usize,
-    /// The distances.
     pub lengths: Vec<Length>,
 }
 
 /// Distances to a fixed point that is unknown.
 #[derive(Debug, Clone)]
 pub struct Wire {
-    /// The distances.
     pub lengths: Vec<Length>,
     /// Where the search for the point starts, base frame, mm.
     pub anchor_mm: Vector3<f64>,
@@ -27,24 +24,28 @@ pub struct Wire {
     pub offset: bool,
 }
 
-fn gained(length: &Length, extras: &[f64]) -> f64 {
-    length.extra.iter().zip(extras).map(|(x, e)| x * e).sum()
-}
-
-fn place_extra(jacobian: &mut DMatrix<f64>, row: usize, length: &Length, by: f64) {
-    let first = jacobian.ncols() - length.extra.len();
-    for (k, x) in length.extra.iter().enumerate() {
-        jacobian[(row, first + k)] = x * by;
+/// White derivatives of lengths in which the scatter enters so many times; `along` is a length as a vector, and how it moves.
+fn outer(
+    lengths: &[Length],
+    columns: usize,
+    scatter: &Scatter,
+    times: f64,
+    along: &dyn Fn(&Length) -> (Vector3<f64>, Matrix3xX<f64>),
+) -> DMatrix<f64> {
+    let mut jacobian = DMatrix::zeros(lengths.len(), columns);
+    for (i, l) in lengths.iter().enumerate() {
+        let (vector, moves) = along(l);
+        let by = l.weight / scatter.sd(l, times);
+        let row = (direction(&vector).0 * by).transpose() * moves;
+        jacobian.view_mut((i, 0), (1, row.ncols())).copy_from(&row);
+        jacobian.view_mut((i, columns - l.extra.len()), (1, l.extra.len())).copy_from(&(&l.extra * by));
     }
-}
-
-fn column_count(places: &[Place], extras: usize) -> usize {
-    places.first().map_or(0, |p| p.point_columns.ncols()) + extras
+    jacobian
 }
 
 impl Center {
     fn residual(&self, places: &[Place], extras: &[f64], l: &Length) -> f64 {
-        (places[l.pose].point_mm - places[self.center].point_mm).norm() - l.length_mm + gained(l, extras)
+        (places[l.pose].point_mm - places[self.center].point_mm).norm() - l.length_mm + l.gained(extras)
     }
 
     pub(super) fn inner(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (DVector<f64>, DMatrix<f64>) {
@@ -55,16 +56,10 @@ impl Center {
 
     pub(super) fn outer(&self, places: &[Place], extras: usize, scatter: &Scatter) -> DMatrix<f64> {
         let center = &places[self.center];
-        let mut jacobian = DMatrix::zeros(self.lengths.len(), column_count(places, extras));
-        for (i, l) in self.lengths.iter().enumerate() {
+        outer(&self.lengths, column_count(places) + extras, scatter, 2.0, &|l| {
             let place = &places[l.pose];
-            let by = l.weight / scatter.sd(l, 2.0);
-            let u = direction(&(place.point_mm - center.point_mm)).0 * by;
-            let row = u.transpose() * (&place.point_columns - &center.point_columns);
-            jacobian.view_mut((i, 0), (1, row.ncols())).copy_from(&row);
-            place_extra(&mut jacobian, i, l, by);
-        }
-        jacobian
+            (place.point_mm - center.point_mm, &place.point_columns - &center.point_columns)
+        })
     }
 
     /// White derivatives of the residuals with respect to the centre, where it is another point than the one that was measured: three columns.
@@ -103,7 +98,7 @@ impl Wire {
         for (i, l) in self.lengths.iter().enumerate() {
             let (u, distance) = direction(&(places[l.pose].point_mm.coords - anchor_mm));
             let by = l.weight / scatter.sd(l, 1.0);
-            residuals[i] = (distance + zero_mm - l.length_mm + gained(l, extras)) * by;
+            residuals[i] = (distance + zero_mm - l.length_mm + l.gained(extras)) * by;
             design.fixed_view_mut::<1, 3>(i, 0).copy_from(&(-u.transpose() * by));
             if self.offset {
                 design[(i, 3)] = by;
@@ -119,16 +114,10 @@ impl Wire {
         scatter: &Scatter,
         anchor_mm: &Vector3<f64>,
     ) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.lengths.len(), column_count(places, extras));
-        for (i, l) in self.lengths.iter().enumerate() {
+        outer(&self.lengths, column_count(places) + extras, scatter, 1.0, &|l| {
             let place = &places[l.pose];
-            let by = l.weight / scatter.sd(l, 1.0);
-            let u = direction(&(place.point_mm.coords - anchor_mm)).0 * by;
-            let row = u.transpose() * &place.point_columns;
-            jacobian.view_mut((i, 0), (1, row.ncols())).copy_from(&row);
-            place_extra(&mut jacobian, i, l, by);
-        }
-        jacobian
+            (place.point_mm.coords - anchor_mm, place.point_columns.clone())
+        })
     }
 
     pub(super) fn raw(
@@ -140,7 +129,7 @@ impl Wire {
     ) -> Vec<(usize, f64, Raw)> {
         let raw = |l: &Length| {
             let distance = (places[l.pose].point_mm.coords - anchor_mm).norm();
-            let residual = distance + zero_mm - l.length_mm + gained(l, extras);
+            let residual = distance + zero_mm - l.length_mm + l.gained(extras);
             (l.pose, l.weight, Raw::Length(residual, l.variance_mm2, 1.0))
         };
         self.lengths.iter().map(raw).collect()

@@ -10,11 +10,10 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use super::distances::{Center, Wire};
 use super::pairwise::Pairs;
 use super::points::Points;
-use super::raw::Raw;
 use super::touch::Touch;
 use crate::geometry::Transform;
-use crate::identify::model::kinematics::Place;
-use crate::identify::sensor::Scatter;
+use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::sensor::{Raw, Scatter};
 use crate::linear_algebra::{pseudo_inverse, without};
 
 /// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
@@ -41,7 +40,6 @@ pub enum Block {
 /// The unknowns of a placement.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unknowns {
-    /// None.
     Nothing,
     /// The wire's fixed point, base frame, and its reading at length zero, mm.
     Anchor(Vector3<f64>, f64),
@@ -49,15 +47,6 @@ pub enum Unknowns {
     Sockets(Vec<Vector3<f64>>),
     /// `sensor_from_base`
     Frame(Transform),
-}
-
-/// Residuals with the placement's unknowns at their best, and derivatives where asked.
-#[derive(Debug, Clone)]
-pub struct Evaluated {
-    /// White.
-    pub residuals: DVector<f64>,
-    /// White, the unknowns eliminated; no columns unless asked for.
-    pub jacobian: DMatrix<f64>,
 }
 
 /// White residuals with derivatives as they are, nothing eliminated.
@@ -82,11 +71,9 @@ impl Block {
         }
     }
 
-    /// Number of residuals.
     pub fn row_count(&self) -> usize {
         match self {
-            Block::Center(center) => center.lengths.len(),
-            Block::Wire(wire) => wire.lengths.len(),
+            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => lengths.len(),
             Block::Touch(touch) => touch.row_count(),
             Block::Points(points) => points.rows_a_spot() * points.spots.len(),
             Block::Pairwise(pairs) => pairs.row_count(),
@@ -97,8 +84,9 @@ impl Block {
     pub fn count(&self) -> usize {
         let counted = |weights: &mut dyn Iterator<Item = f64>| weights.filter(|w| *w > 0.0).count();
         let numbers = match self {
-            Block::Center(center) => counted(&mut center.lengths.iter().map(|l| l.weight)),
-            Block::Wire(wire) => counted(&mut wire.lengths.iter().map(|l| l.weight)),
+            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
+                counted(&mut lengths.iter().map(|l| l.weight))
+            }
             Block::Touch(touch) => 3 * counted(&mut touch.contacts.iter().map(|c| c.weight)) + touch.known.len(),
             Block::Points(points) => points.count(),
             Block::Pairwise(pairs) => pairs.count(),
@@ -109,8 +97,9 @@ impl Block {
     /// Index among the places of the pose that each residual belongs to; `None` for what belongs to no pose.
     pub fn row_poses(&self) -> Vec<Option<usize>> {
         match self {
-            Block::Center(center) => center.lengths.iter().map(|l| Some(l.pose)).collect(),
-            Block::Wire(wire) => wire.lengths.iter().map(|l| Some(l.pose)).collect(),
+            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
+                lengths.iter().map(|l| Some(l.pose)).collect()
+            }
             Block::Touch(touch) => touch.row_poses(),
             Block::Points(points) => {
                 let rows = points.rows_a_spot();
@@ -142,37 +131,26 @@ impl Block {
             (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.inner(places, extras, scatter, point, *zero),
             (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.inner(places, scatter, sockets),
             (Block::Points(points), Unknowns::Frame(frame)) => points.inner(places, extras, scatter, frame),
-            (Block::Pairwise(pairs), _) => {
-                let residuals = pairs.residuals(places);
-                let rows = residuals.len();
-                (residuals, DMatrix::zeros(rows, 0))
-            }
+            (Block::Pairwise(pairs), _) => (pairs.residuals(places), DMatrix::zeros(pairs.row_count(), 0)),
             _ => (DVector::zeros(0), DMatrix::zeros(0, 0)),
         }
     }
 
     /// White derivatives with respect to the robot's parameters and the extra unknowns, the block's own held.
     fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, at: &Unknowns) -> DMatrix<f64> {
+        let columns = column_count(places) + extras.len();
         match (self, at) {
             (Block::Center(center), _) => center.outer(places, extras.len(), scatter),
             (Block::Wire(wire), Unknowns::Anchor(point, _)) => wire.outer(places, extras.len(), scatter, point),
             (Block::Touch(touch), _) => touch.outer(places, extras.len(), scatter),
             (Block::Points(points), Unknowns::Frame(frame)) => points.outer(places, extras, scatter, frame),
-            (Block::Pairwise(pairs), _) => {
-                let jacobian = pairs.derivatives(places);
-                let columns = jacobian.ncols() + extras.len();
-                jacobian.resize_horizontally(columns, 0.0)
-            }
-            _ => DMatrix::zeros(0, places.first().map_or(0, |p| p.point_columns.ncols()) + extras.len()),
+            (Block::Pairwise(pairs), _) => pairs.derivatives(places).resize_horizontally(columns, 0.0),
+            _ => DMatrix::zeros(0, columns),
         }
     }
 
-    /// The unknowns at their best.
-    pub fn solved(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> Unknowns {
-        self.solve(places, extras, scatter).0
-    }
-
-    fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
+    /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
+    pub fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
         let mut at = self.start(places);
         let (mut residuals, mut design) = self.inner(places, extras, scatter, &at);
         if self.unknown_count() == 0 {
@@ -198,8 +176,15 @@ impl Block {
         (at, residuals, design)
     }
 
-    /// Solves for the unknowns, then residuals and (where the places have columns and `derivatives`) the Jacobian.
-    pub fn evaluate(&self, places: &[Place], extras: &[f64], scatter: &Scatter, derivatives: bool) -> Evaluated {
+    /// White residuals with the placement's unknowns at their best, and (where the places have columns and `derivatives`) the Jacobian with these
+    /// eliminated.
+    pub fn evaluate(
+        &self,
+        places: &[Place],
+        extras: &[f64],
+        scatter: &Scatter,
+        derivatives: bool,
+    ) -> (DVector<f64>, DMatrix<f64>) {
         let (unknowns, residuals, design) = self.solve(places, extras, scatter);
         let mut jacobian = DMatrix::zeros(residuals.len(), 0);
         if derivatives {
@@ -208,7 +193,7 @@ impl Block {
                 jacobian = without(&jacobian, &design);
             }
         }
-        Evaluated { residuals, jacobian }
+        (residuals, jacobian)
     }
 
     /// Residuals and all derivatives with the unknowns at their best, nothing eliminated.
@@ -224,7 +209,7 @@ impl Block {
             (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.raw(places, extras, point, *zero),
             (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.raw(places, sockets),
             (Block::Points(points), Unknowns::Frame(frame)) => points.raw(places, extras, frame),
-            (Block::Pairwise(pairs), _) => pairs.raw(places).into_iter().map(|(pose, raw)| (pose, 1.0, raw)).collect(),
+            (Block::Pairwise(pairs), _) => pairs.raw(places),
             _ => Vec::new(),
         }
     }

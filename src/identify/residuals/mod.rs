@@ -4,7 +4,6 @@ pub mod distances;
 pub mod eliminate;
 pub mod pairwise;
 pub mod points;
-pub mod raw;
 pub mod rows;
 pub mod smooth;
 pub mod starts;

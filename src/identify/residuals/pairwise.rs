@@ -9,9 +9,8 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Vector3};
 
 use crate::geometry::direction;
-use crate::identify::model::kinematics::Place;
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::{Scatter, Spot};
+use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::sensor::{Raw, Scatter, Spot};
 
 /// Poses whose distances are taken together at the most.
 pub const CHUNK: usize = 60;
@@ -35,14 +34,8 @@ impl Pairs {
     /// Of the points of one chunk; `None` where they coincide.
     pub fn new(spots: Vec<Spot>, scatter: &Scatter) -> Option<Pairs> {
         let n = spots.len();
-        let colour: Vec<Matrix3<f64>> = spots
-            .iter()
-            .map(|s| {
-                (scatter.whitener(&s.covariance_mm2) * s.weight.max(1e-6))
-                    .try_inverse()
-                    .unwrap_or_else(Matrix3::identity)
-            })
-            .collect();
+        let inverse = |s: &Spot| (scatter.whitener(&s.covariance_mm2) * s.weight.max(1e-6)).try_inverse();
+        let colour: Vec<Matrix3<f64>> = spots.iter().map(|s| inverse(s).unwrap_or_else(Matrix3::identity)).collect();
         let (mut directions, mut lengths_mm) = (Vec::new(), Vec::new());
         let mut normal = DMatrix::<f64>::zeros(3 * n, 3 * n);
         for a in 0..n {
@@ -96,7 +89,7 @@ impl Pairs {
 
     /// Derivatives of [`Pairs::residuals`].
     pub fn derivatives(&self, places: &[Place]) -> DMatrix<f64> {
-        let columns = places.first().map_or(0, |p| p.point_columns.ncols());
+        let columns = column_count(places);
         let n = self.spots.len();
         let mut sums = vec![Matrix3xX::zeros(columns); n];
         let mut row = nalgebra::RowDVector::zeros(columns);
@@ -123,11 +116,11 @@ impl Pairs {
     }
 
     /// The same as point noise in mm.
-    pub fn raw(&self, places: &[Place]) -> Vec<(usize, Raw)> {
+    pub fn raw(&self, places: &[Place]) -> Vec<(usize, f64, Raw)> {
         let white = self.residuals(places);
         let raw = |(i, spot): (usize, &Spot)| {
             let e = self.colour[i] * white.fixed_rows::<3>(3 * i);
-            (spot.pose, Raw::Point(e, spot.covariance_mm2))
+            (spot.pose, 1.0, Raw::Point(e, spot.covariance_mm2))
         };
         self.spots.iter().enumerate().map(raw).collect()
     }

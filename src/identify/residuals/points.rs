@@ -6,9 +6,8 @@ use super::smooth::Field;
 use crate::geometry::{
     Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
 };
-use crate::identify::model::kinematics::Place;
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::{Extra, Scatter, Spot};
+use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::sensor::{Extra, Raw, Scatter, Spot};
 use crate::robot::jacobian::RAD_PER_MRAD;
 
 /// Points are on a line where they are scattered square to it by less than this share of what they are along it.
@@ -17,14 +16,12 @@ const LINE: f64 = 0.01;
 /// The points of one placement.
 #[derive(Debug, Clone)]
 pub struct Points {
-    /// What was measured.
     pub spots: Vec<Spot>,
     /// Where the search for the transform starts.
     pub sensor_from_base: Transform,
     pub on_a_line: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
-    /// Whether orientations are used.
     pub oriented: bool,
     /// Which of the extra unknowns turn the target: index and axis.
     pub target: Vec<(usize, usize)>,
@@ -135,7 +132,7 @@ impl Points {
 
     pub(super) fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, frame: &Transform) -> DMatrix<f64> {
         let rows = self.rows_a_spot();
-        let robot = places.first().map_or(0, |p| p.point_columns.ncols());
+        let robot = column_count(places);
         let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(extras));
         let mut jacobian = DMatrix::zeros(rows * self.spots.len(), robot + extras.len());
         for (i, spot) in self.spots.iter().enumerate() {
@@ -190,12 +187,8 @@ impl Points {
             let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot) - smooth;
             list.push((spot.pose, spot.weight, Raw::Point(residual, spot.covariance_mm2)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
-                let sensor_from_flange = rotation_matrix(frame) * place.rotation;
-                list.push((
-                    spot.pose,
-                    spot.weight,
-                    Raw::Turn(turn(&sensor_from_flange, &flange_from_target, measured)),
-                ));
+                let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);
+                list.push((spot.pose, spot.weight, Raw::Turn(turn)));
             }
         }
         list
@@ -203,11 +196,7 @@ impl Points {
 }
 
 /// Predicted orientation after the measured one, as a rotation vector in the sensor's frame.
-pub fn turn(
-    sensor_from_flange: &Matrix3<f64>,
-    flange_from_target: &Matrix3<f64>,
-    measured: &Matrix3<f64>,
-) -> Vector3<f64> {
+fn turn(sensor_from_flange: &Matrix3<f64>, flange_from_target: &Matrix3<f64>, measured: &Matrix3<f64>) -> Vector3<f64> {
     rotation_vector_of_matrix(&(sensor_from_flange * flange_from_target * measured.transpose()))
 }
 

@@ -3,27 +3,28 @@
 //! In: the data set, the rows to use with their weights, the model, the parameters that may move, the sensor's extra unknowns.
 //! Out: white residuals and derivatives with respect to all parameters and extras, the placements' unknowns eliminated.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector, Vector3};
+use std::collections::BTreeSet;
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector};
 
 use super::distances::{Center, Wire};
-use super::eliminate::{Block, Evaluated, Unknowns};
+use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
-use super::starts::{first_anchor, frames_and_turn, middle};
+use super::starts::{first_anchor, frames_and_turn};
 use super::touch::{Contact, Touch};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
+use crate::identify::data::targets::middle;
 use crate::identify::model::kinematics::{Kinematics, Place};
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::{Extra, Length, Scatter, Spot};
+use crate::identify::sensor::{Extra, Length, Raw, Scatter, Spot};
 use crate::identify::settings::Model;
 use crate::robot::{Parameter, Robot};
 
 /// What to build residuals from.
 #[derive(Debug, Clone, Copy)]
 pub struct RowSpec<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// The robot whose parameters are offset.
     pub robot: &'a Robot,
@@ -37,7 +38,6 @@ pub struct RowSpec<'a> {
     pub rows: &'a [usize],
     /// Roots of the rows' weights, one a row of the data set; empty where all count fully.
     pub weights: &'a [f64],
-    /// What counts as a residual.
     pub model: Model,
     /// Scatter beyond the measurement's covariance.
     pub scatter: Scatter,
@@ -52,7 +52,6 @@ pub struct Rows {
     pub kinematics: Kinematics,
     /// Which row of the data set each place is.
     pub rows: Vec<usize>,
-    /// Residuals.
     pub blocks: Vec<Block>,
     /// Scatter beyond the measurement's covariance.
     pub scatter: Scatter,
@@ -71,13 +70,14 @@ impl Rows {
         let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
         let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
         let places = kinematics.places(&vec![0.0; parameters.len()], false);
-        let blocks = Inputs { spec, used: &used, places: &places, by_group: by_group(set, rows) }.blocks();
+        let by_group = (0..set.groups.len()).map(|group| set.of_group(rows, group)).collect();
+        let blocks = Inputs { spec, used: &used, places: &places, by_group }.blocks();
         Rows { kinematics, rows: used, blocks, scatter: spec.scatter, extras: spec.extras.to_vec() }
     }
 
     /// Number of offsets: the robot's parameters, then the extra unknowns.
     pub fn offset_count(&self) -> usize {
-        self.kinematics.parameters().len() + self.extras.len()
+        self.kinematics.parameters.len() + self.extras.len()
     }
 
     /// Numbers measured, less the unknowns of the placements.
@@ -87,24 +87,23 @@ impl Rows {
 
     /// The robot's offsets and the extras' values in one vector of offsets.
     pub fn split<'a>(&self, offsets: &'a [f64]) -> (&'a [f64], &'a [f64]) {
-        offsets.split_at(self.kinematics.parameters().len())
+        offsets.split_at(self.kinematics.parameters.len())
     }
 
     /// White residuals and derivatives with respect to all offsets.
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, derivatives);
-        let parts: Vec<Evaluated> =
+        let parts: Vec<(DVector<f64>, DMatrix<f64>)> =
             self.blocks.iter().map(|b| b.evaluate(&places, extras, &self.scatter, derivatives)).collect();
-        let rows = parts.iter().map(|p| p.residuals.len()).sum();
+        let rows = parts.iter().map(|(residuals, _)| residuals.len()).sum();
         let columns = if derivatives { offsets.len() } else { 0 };
         let (mut residuals, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
         let mut row = 0;
-        for part in parts {
-            let count = part.residuals.len();
-            residuals.rows_mut(row, count).copy_from(&part.residuals);
-            jacobian.rows_mut(row, count).copy_from(&part.jacobian);
-            row += count;
+        for (of_block, columns) in parts {
+            residuals.rows_mut(row, of_block.len()).copy_from(&of_block);
+            jacobian.rows_mut(row, of_block.len()).copy_from(&columns);
+            row += of_block.len();
         }
         (residuals, jacobian)
     }
@@ -113,7 +112,7 @@ impl Rows {
     pub fn raw(&self, offsets: &[f64]) -> Vec<(usize, f64, Raw)> {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, false);
-        let of_block = |b: &Block| b.raw(&places, extras, &b.solved(&places, extras, &self.scatter));
+        let of_block = |b: &Block| b.raw(&places, extras, &b.solve(&places, extras, &self.scatter).0);
         self.blocks.iter().flat_map(of_block).map(|(place, w, raw)| (self.rows[place], w, raw)).collect()
     }
 
@@ -121,7 +120,7 @@ impl Rows {
     pub fn unknowns(&self, offsets: &[f64]) -> Vec<Unknowns> {
         let (of_robot, extras) = self.split(offsets);
         let places = self.kinematics.places(of_robot, false);
-        self.blocks.iter().map(|b| b.solved(&places, extras, &self.scatter)).collect()
+        self.blocks.iter().map(|b| b.solve(&places, extras, &self.scatter).0).collect()
     }
 
     /// The variance that stands for one, mm^2: costs are multiplied by it.
@@ -146,7 +145,7 @@ impl Rows {
 
     /// Degrees of freedom that residuals lose to smooth errors that placements share.
     pub fn lost_to_smooth(&self) -> f64 {
-        let lost = |b: &Block| if let Block::Points(Points { field: Some(f), .. }) = b { f.lost() } else { 0.0 };
+        let lost = |b: &Block| if let Block::Points(Points { field: Some(f), .. }) = b { f.lost } else { 0.0 };
         self.blocks.iter().map(lost).sum()
     }
 
@@ -155,7 +154,7 @@ impl Rows {
         let (mut sum, mut count) = (0.0, 0);
         for block in &self.blocks {
             if let Block::Points(Points { field: Some(field), spots, .. }) = block {
-                sum += field.left_mm2() * spots.len() as f64;
+                sum += field.left_mm2 * spots.len() as f64;
                 count += spots.len();
             }
         }
@@ -171,23 +170,22 @@ impl Rows {
         let mut fixed = self.clone();
         fixed.scatter.smooth = None;
         let off = |length: &mut Length| {
-            length.length_mm -= length.extra.iter().zip(extras).map(|(x, e)| x * e).sum::<f64>();
+            length.length_mm -= length.gained(extras);
             length.extra = RowDVector::zeros(0);
         };
         for (block, unknowns) in fixed.blocks.iter_mut().zip(&unknowns) {
             match block {
-                Block::Center(c) => c.lengths.iter_mut().for_each(off),
-                Block::Wire(w) => w.lengths.iter_mut().for_each(off),
+                Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
+                    lengths.iter_mut().for_each(off);
+                }
                 Block::Points(p) => {
-                    if let Unknowns::Frame(frame) = unknowns {
-                        let smooth = p.smooth_mm(&places, extras, frame);
-                        // Residuals are predicted less measured.
-                        p.spots.iter_mut().zip(smooth).for_each(|(spot, error)| spot.point_mm += error);
-                    }
-                    p.field = None;
-                    p.flange_from_target = p.turned_target(extras);
+                    let Unknowns::Frame(frame) = unknowns else { continue };
+                    let smooth = p.smooth_mm(&places, extras, frame);
+                    (p.field, p.flange_from_target) = (None, p.turned_target(extras));
                     p.target.clear();
-                    for spot in &mut p.spots {
+                    for (spot, error) in p.spots.iter_mut().zip(smooth) {
+                        // Residuals are predicted less measured.
+                        spot.point_mm += error;
                         for (column, e) in spot.extra.column_iter().zip(extras) {
                             spot.point_mm -= column * *e;
                         }
@@ -200,14 +198,6 @@ impl Rows {
         fixed.extras.clear();
         fixed
     }
-}
-
-fn by_group(set: &Dataset, rows: &[usize]) -> Vec<Vec<usize>> {
-    let mut lists = vec![Vec::new(); set.groups.len()];
-    for &row in rows {
-        lists[set.poses[row].group].push(row);
-    }
-    lists
 }
 
 /// What a point of a placement gains with each extra unknown, mm (see [`Extra`]).
@@ -227,8 +217,9 @@ struct Inputs<'a> {
 }
 
 impl Inputs<'_> {
-    fn place_of(&self, row: usize) -> Option<usize> {
-        self.used.binary_search(&row).ok()
+    /// The place of a row that is used.
+    fn place_of(&self, row: usize) -> usize {
+        self.used.partition_point(|&used| used < row)
     }
 
     fn weight(&self, row: usize) -> f64 {
@@ -250,7 +241,7 @@ impl Inputs<'_> {
         let zero = |e: &Extra| if *e == Extra::Zero { 1.0 } else { 0.0 };
         let length = |&i: &usize| match self.spec.set.poses[i].reading {
             Reading::Distance { distance_mm, sigma_mm } if distance_mm > 0.0 => Some(Length {
-                pose: self.place_of(i)?,
+                pose: self.place_of(i),
                 length_mm: distance_mm,
                 variance_mm2: sigma_mm.map_or(0.0, |s| s * s),
                 weight: self.weight(i),
@@ -262,7 +253,7 @@ impl Inputs<'_> {
         if lengths.is_empty() {
             return None;
         }
-        match self.spec.set.groups[group].center.and_then(|c| self.place_of(c)) {
+        match self.spec.set.groups[group].center.map(|c| self.place_of(c)) {
             Some(center) => Some(Block::Center(Center { center, lengths })),
             None => {
                 let anchor_mm = first_anchor(self.places, &lengths);
@@ -274,18 +265,8 @@ impl Inputs<'_> {
     /// One block for all sockets that known distances tie together.
     fn touches(&self) -> Vec<Block> {
         let set = self.spec.set;
-        let touched: Vec<(usize, Vec<(usize, f64)>)> = (0..set.groups.len())
-            .filter_map(|g| {
-                let contact = |&i: &usize| match set.poses[i].reading {
-                    Reading::Distance { distance_mm, sigma_mm } if set.touches(i) && distance_mm == 0.0 => {
-                        Some((i, sigma_mm.map_or(0.0, |s| s * s)))
-                    }
-                    _ => None,
-                };
-                let list: Vec<(usize, f64)> = self.by_group[g].iter().filter_map(contact).collect();
-                (!list.is_empty()).then_some((g, list))
-            })
-            .collect();
+        let touches = |group: usize| self.by_group[group].iter().copied().filter(|&i| set.touches(i));
+        let touched = || (0..set.groups.len()).filter(|&group| touches(group).next().is_some());
         // The lowest group that a group is tied to, by repeated lowering: there are few.
         let mut tied: Vec<usize> = (0..set.groups.len()).collect();
         for _ in 0..set.known.len() {
@@ -295,46 +276,40 @@ impl Inputs<'_> {
             }
         }
         let block = |root: usize| {
-            let members: Vec<&(usize, Vec<(usize, f64)>)> = touched.iter().filter(|(g, _)| tied[*g] == root).collect();
-            let (mut sockets, mut contacts) = (Vec::new(), Vec::new());
-            for (socket, (_, list)) in members.iter().enumerate() {
-                let points: Vec<Vector3<f64>> =
-                    list.iter().filter_map(|(i, _)| Some(self.places[self.place_of(*i)?].point_mm.coords)).collect();
-                sockets.push(middle(&points));
-                contacts.extend(list.iter().filter_map(|&(i, variance_mm2)| {
-                    Some(Contact { pose: self.place_of(i)?, socket, variance_mm2, weight: self.weight(i) })
-                }));
-            }
-            let at = |group: usize| members.iter().position(|(g, _)| *g == group);
+            let members: Vec<usize> = touched().filter(|&group| tied[group] == root).collect();
+            let point = |i: usize| self.places[self.place_of(i)].point_mm.coords;
+            let sockets = members.iter().map(|&group| middle(&touches(group).map(point).collect::<Vec<_>>())).collect();
+            let contact = |socket: usize, i: usize| Contact {
+                pose: self.place_of(i),
+                socket,
+                variance_mm2: set.poses[i].reading.variance_mm2().unwrap_or(0.0),
+                weight: self.weight(i),
+            };
+            let of_socket = |(socket, &group): (usize, &usize)| touches(group).map(move |i| contact(socket, i));
+            let contacts = members.iter().enumerate().flat_map(of_socket).collect();
+            let at = |group: usize| members.iter().position(|g| *g == group);
             let known =
                 |(index, k): (usize, &KnownDistance)| Some((index, KnownDistance { a: at(k.a)?, b: at(k.b)?, ..*k }));
             let known = set.known.iter().enumerate().filter_map(known).collect();
             Block::Touch(Touch { sockets, contacts, known })
         };
-        let mut roots: Vec<usize> = touched.iter().map(|(g, _)| tied[*g]).collect();
-        roots.sort_unstable();
-        roots.dedup();
-        roots.into_iter().map(block).collect()
+        touched().map(|group| tied[group]).collect::<BTreeSet<usize>>().into_iter().map(block).collect()
     }
 
     fn spot(&self, row: usize) -> Option<Spot> {
-        let pose = self.place_of(row)?;
-        match &self.spec.set.poses[row].reading {
-            Reading::Position { point_mm, covariance_mm2, rotation_rad } => {
-                let (weight, covariance_mm2) = (self.weight(row), covariance_mm2.unwrap_or_else(Matrix3::zeros));
-                Some(Spot {
-                    pose,
-                    point_mm: *point_mm,
-                    on_body_mm: self.spec.set.poses[row].on_body_mm,
-                    covariance_mm2,
-                    whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
-                    rotation: rotation_rad.map(|r| Rotation3::new(r).into_inner()),
-                    weight,
-                    extra: point_extra(self.spec.set, row, point_mm, self.spec.extras),
-                })
-            }
-            _ => None,
-        }
+        let (pose, weight) = (&self.spec.set.poses[row], self.weight(row));
+        let point_mm = pose.reading.point_mm()?;
+        let covariance_mm2 = pose.reading.covariance_mm2().unwrap_or_else(Matrix3::zeros);
+        Some(Spot {
+            pose: self.place_of(row),
+            point_mm,
+            on_body_mm: pose.on_body_mm,
+            covariance_mm2,
+            whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
+            rotation: pose.reading.rotation_rad().map(|r| Rotation3::new(r).into_inner()),
+            weight,
+            extra: point_extra(self.spec.set, row, &point_mm, self.spec.extras),
+        })
     }
 
     fn center_distances(&self, group: usize) -> Option<Block> {

@@ -33,9 +33,9 @@ pub struct Field {
     /// Covariance of the unknowns given the residuals.
     covariance: DMatrix<f64>,
     /// Degrees of freedom that residuals lose to it beyond those of the placement's transform.
-    lost: f64,
+    pub lost: f64,
     /// Mean square of a coordinate that is left after a rigid fit to the points, mm^2.
-    left_mm2: f64,
+    pub left_mm2: f64,
 }
 
 impl Field {
@@ -82,16 +82,6 @@ impl Field {
             shares.iter().enumerate().map(|(k, f)| unknowns.fixed_rows::<3>(3 * k) * *f).sum::<Vector3<f64>>()
         };
         (0..residuals.len()).map(error).collect()
-    }
-
-    /// Degrees of freedom that residuals lose to it beyond those of the placement's transform.
-    pub fn lost(&self) -> f64 {
-        self.lost
-    }
-
-    /// Mean square of a coordinate that is left after a rigid fit to the points, mm^2.
-    pub fn left_mm2(&self) -> f64 {
-        self.left_mm2
     }
 }
 
@@ -208,6 +198,6 @@ mod tests {
         let field = Field::new(&points, 3, SmoothError { sd_mm: 0.01, length_mm: 500.0 });
         let rest = field.most_probable(&rough);
         let (left, all) = (rest.iter().map(Vector3::norm).sum::<f64>(), rough.iter().map(Vector3::norm).sum::<f64>());
-        assert!(left < 0.3 * all && field.lost() > 0.0 && field.lost() < 20.0, "{left} {all} {}", field.lost());
+        assert!(left < 0.3 * all && field.lost > 0.0 && field.lost < 20.0, "{left} {all} {}", field.lost);
     }
 }

@@ -5,7 +5,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3, Vector3};
 
-use crate::geometry::{Transform, fitted_frame, nearest_rotation};
+use crate::geometry::{Transform, fitted_frame, nearest_rotation, rotation_matrix};
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::{Length, Spot};
 use crate::linear_algebra::pseudo_inverse;
@@ -74,17 +74,12 @@ fn robust_frame(spots: &[Spot], places: &[Place], turn: Option<&Matrix3<f64>>) -
     frame
 }
 
-/// Coordinate by coordinate the median.
-pub(super) fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
-    Vector3::from_fn(|axis, _| median(points.iter().map(|p| p[axis])).unwrap_or(0.0))
-}
-
 /// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the body, which stands in some
 /// direction from the mark point.
 fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
     let mut sum = Matrix3::zeros();
     for (spots, frame) in lists.iter().zip(frames) {
-        let rotation = crate::geometry::rotation_matrix(frame);
+        let rotation = rotation_matrix(frame);
         for spot in spots {
             if let Some(measured) = &spot.rotation {
                 sum += (rotation * places[spot.pose].rotation).transpose() * measured;

@@ -6,9 +6,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::geometry::direction;
 use crate::identify::data::dataset::KnownDistance;
-use crate::identify::model::kinematics::Place;
-use crate::identify::residuals::raw::Raw;
-use crate::identify::sensor::Scatter;
+use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::sensor::{Raw, Scatter};
 
 /// A pose at which a socket was touched.
 #[derive(Debug, Clone, PartialEq)]
@@ -73,7 +72,7 @@ impl Touch {
     }
 
     pub(super) fn outer(&self, places: &[Place], extras: usize, scatter: &Scatter) -> DMatrix<f64> {
-        let robot = places.first().map_or(0, |p| p.point_columns.ncols());
+        let robot = column_count(places);
         let mut jacobian = DMatrix::zeros(self.row_count(), robot + extras);
         for (i, contact) in self.contacts.iter().enumerate() {
             let by = Touch::by(contact, scatter);

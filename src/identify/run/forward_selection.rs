@@ -8,10 +8,10 @@ use rayon::prelude::*;
 
 use super::session::Session;
 use crate::identify::Error;
-use crate::identify::judge::cross_validation::CrossValidation;
+use crate::identify::judge::cross_validation::{CrossValidation, HeldOut, clearly_less, root_mean};
 use crate::identify::judge::folds;
-use crate::identify::judge::held_out::{HeldOut, clearly_less, root_mean};
 use crate::identify::model::ladder::{Chain, Terms};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{EVIDENCE, Extra, Scatter, WARPS};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
@@ -21,9 +21,7 @@ use crate::robot::Parameter;
 /// A rung of the ladder, or a model, and how it did.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Judged {
-    /// The model's name.
     pub model: &'static str,
-    /// The terms in words.
     pub terms: String,
     #[serde(skip)]
     pub of: Terms,
@@ -55,9 +53,7 @@ pub fn certainty(judged: &[Judged], terms: &Terms) -> Vec<Certainty> {
     };
     let nominal = judged.iter().find(|j| j.of == Terms::NOMINAL);
     let others = judged.iter().filter(|j| j.of != Terms::NOMINAL && !j.of.contains(terms));
-    let next = others
-        .filter(|j| j.held_out_mm.is_some())
-        .min_by(|a, b| a.held_out_mm.unwrap_or(f64::INFINITY).total_cmp(&b.held_out_mm.unwrap_or(f64::INFINITY)));
+    let next = others.filter_map(|j| Some((j.held_out_mm?, j))).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, j)| j);
     nominal.filter(|n| n.of != *terms).into_iter().chain(next).map(against).collect()
 }
 
@@ -137,7 +133,7 @@ impl Session<'_> {
         };
         let worth = |new: &(Terms, Ways), old: &(Terms, Ways)| {
             evidence(&new.0) - evidence(&old.0) > EVIDENCE
-                && match regions.whole_placements() || old.0 == Terms::NOMINAL {
+                && match regions.whole_placements || old.0 == Terms::NOMINAL {
                     true => clearly(&new.1, &old.1),
                     false => root_mean_of(&new.1) < root_mean_of(&old.1),
                 }
@@ -178,22 +174,33 @@ impl Session<'_> {
         scatter: Scatter,
         model: Model,
     ) -> Vec<CrossValidation> {
-        let offsets = at.offsets_of();
-        let (of_robot, extras) = offsets.split_at(reference.len());
-        let mut wide: Vec<f64> =
-            all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i])).collect();
-        wide.extend_from_slice(extras);
-        let load_chain = self.robot.shifted(reference, of_robot);
-        let rows = self.task(all, model).rows_at(scatter, &load_chain);
-        let linearised = Linearised::new(&rows, &wide);
+        let (rows, linearised) = self.linearised(all, reference, at, scatter, model);
         let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
-        if regions.whole_placements() {
+        if regions.whole_placements {
             return vec![regions];
         }
         let scattered = folds::folds(self.set, &self.rows);
         let others: Vec<CrossValidation> =
             scattered.iter().map(|of_row| CrossValidation::by_folds(&linearised, &rows, of_row)).collect();
         std::iter::once(regions).chain(others).collect()
+    }
+
+    /// The rows of all these parameters at a scatter, linearised where a formulation of some of them ended.
+    pub(super) fn linearised(
+        &self,
+        all: &[Parameter],
+        reference: &[Parameter],
+        at: &Formulation,
+        scatter: Scatter,
+        model: Model,
+    ) -> (Rows, Linearised) {
+        let offsets = at.offsets_of();
+        let (of_robot, extras) = offsets.split_at(reference.len());
+        let of_all = all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i]));
+        let wide: Vec<f64> = of_all.chain(extras.iter().copied()).collect();
+        let rows = self.task(all, model).rows_at(scatter, &self.robot.shifted(reference, of_robot));
+        let linearised = Linearised::new(&rows, &wide);
+        (rows, linearised)
     }
 
     /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at one and the same

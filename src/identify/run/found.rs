@@ -29,7 +29,6 @@ pub struct Candidate {
 /// Everything that was found.
 #[derive(Debug, Clone)]
 pub struct Identification {
-    /// Methods and models, fitted.
     pub candidates: Vec<Candidate>,
     /// Index of the one to use.
     pub chosen: usize,
@@ -43,7 +42,6 @@ pub struct Identification {
     pub doubtful: Vec<usize>,
     /// Verify rows that are as far off as those left out; they are still counted.
     pub verify_outliers: Vec<usize>,
-    /// Rows that were fitted.
     pub fitted: Vec<usize>,
     /// The scatter that is left of the chosen fit.
     pub scatter: Scatter,
@@ -69,10 +67,19 @@ pub struct Deletion {
 }
 
 impl Identification {
+    /// The robot to use.
+    pub fn robot(&self) -> &Robot {
+        &self.candidates[self.chosen].robot
+    }
+
+    /// The problem that it solves; `None` where it is the nominal one.
+    pub fn formulation(&self) -> Option<&Formulation> {
+        self.candidates[self.chosen].found.as_ref().map(|(formulation, _)| formulation)
+    }
+
     /// A scale of the readings, as the chosen robot has it.
     pub fn scale(&self, set: &Dataset) -> Option<CommonScale> {
-        let (formulation, _) = self.candidates[self.chosen].found.as_ref()?;
-        CommonScale::new(set, &self.terms, formulation)
+        CommonScale::new(set, &self.terms, self.formulation()?)
     }
 
     pub(super) fn keep_nominal(&mut self, robot: &Robot, model: Model, held_out_mm: Option<f64>) {

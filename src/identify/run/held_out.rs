@@ -3,6 +3,8 @@
 //! In: what was identified. Out: errors of the rows to verify, or without any of every row in the fits that it was left out of, and whether they
 //! find the robot worse than the nominal one by more than another draw of rows would let expect (Student's test of the rows' differences).
 
+use std::collections::BTreeSet;
+
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::found::{Deletion, Identification};
@@ -29,15 +31,11 @@ pub enum Against {
 impl Identification {
     /// Rows by which robots are judged: those to verify, without any all that were fitted.
     pub fn judged_rows(&self, set: &Dataset) -> Vec<usize> {
-        match self.deletions.is_empty() {
-            true => set.verify_rows(),
-            false => {
-                let mut rows: Vec<usize> = self.deletions.iter().flat_map(|d| d.rows.iter().copied()).collect();
-                rows.sort_unstable();
-                rows.dedup();
-                rows
-            }
+        if self.deletions.is_empty() {
+            return set.verify_rows();
         }
+        let rows: BTreeSet<usize> = self.deletions.iter().flat_map(|d| d.rows.iter().copied()).collect();
+        rows.into_iter().collect()
     }
 
     /// Rows to verify that fit far worse than the rest and by which nothing is judged: one, or a tenth of them. More than that are no strays.
@@ -57,12 +55,12 @@ impl Identification {
                 return folds::without(judge, robot, rows);
             }
             let (of_robot, of_sensor) = change.split_at(self.deleted_parameters.len());
-            let changed = |(extra, value): (&Extra, &f64)| {
-                let at = self.extras.iter().position(|(e, _)| e == extra);
-                value + at.and_then(|at| of_sensor.get(at)).unwrap_or(&0.0)
+            let changed = |&(extra, value): &(Extra, f64)| {
+                let at = self.extras.iter().position(|(e, _)| *e == extra);
+                (extra, value + at.and_then(|at| of_sensor.get(at)).unwrap_or(&0.0))
             };
-            let values: Vec<f64> = judge.extras.iter().zip(judge.values).map(changed).collect();
-            let judge = Judge { values: &values, ..judge.clone() };
+            let extras: Vec<(Extra, f64)> = judge.extras.iter().map(changed).collect();
+            let judge = Judge { extras: &extras, ..judge.clone() };
             folds::without(&judge, &robot.shifted(&self.deleted_parameters, of_robot), rows)
         };
         folds::one_a_row(judge.set, self.deletions.iter().flat_map(part))
@@ -71,13 +69,11 @@ impl Identification {
     /// How rows that took no part in the fit find the chosen robot against the nominal one: by points where there are any, in units of what
     /// they are known to; by distances otherwise. Distances of points share the point that they start at, which is one draw.
     pub fn against_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Against {
-        let candidate = &self.candidates[self.chosen];
-        if candidate.found.is_none() {
+        if self.formulation().is_none() {
             return Against::NotWorse;
         }
-        let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().unzip();
-        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
-        let [chosen, before] = [(&candidate.robot, true), (nominal, false)].map(|(robot, fitted)| {
+        let judge = Judge { extras: &self.extras, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
+        let [chosen, before] = [(self.robot(), true), (nominal, false)].map(|(robot, fitted)| {
             let mut errors = self.held_out_errors(&judge, robot, fitted);
             errors.retain(|e| !self.verify_outliers.contains(&e.row));
             errors

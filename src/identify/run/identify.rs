@@ -11,9 +11,8 @@
 
 use super::forward_selection::Judged;
 use super::found::{Candidate, Deletion, Identification};
-use super::gross::Gross;
 use super::held_out::Against;
-use super::session::Session;
+use super::session::{Gross, Session};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::shared;
@@ -23,9 +22,7 @@ use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
-use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::problem::Problem;
-use crate::identify::solve::task::Task;
 use crate::identify::solve::{swarm, trust_region};
 use crate::robot::{Parameter, Robot};
 
@@ -229,13 +226,9 @@ impl Session<'_> {
 
     /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
     fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
-        let offsets = at.offsets_of();
-        let load_chain = self.robot.shifted(parameters, &offsets[..parameters.len()]);
         // What is smooth over a placement makes one of all its rows; without it rows can be left out.
         let scatter = Scatter { smooth: None, ..at.rows.scatter };
-        let task = Task { smooth: None, ..self.task(parameters, model) };
-        let rows = task.rows_at(scatter, &load_chain);
-        let linearised = Linearised::new(&rows, &offsets);
+        let (rows, linearised) = self.linearised(parameters, parameters, at, scatter, model);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
             let changes = CrossValidation::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
             let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {

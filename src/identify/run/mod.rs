@@ -2,7 +2,6 @@
 
 mod forward_selection;
 mod found;
-mod gross;
 mod held_out;
 mod identify;
 mod placed;

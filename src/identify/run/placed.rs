@@ -43,16 +43,8 @@ impl Identification {
         }
         let parameters = formulation.parameters();
         let load_chain = nominal.shifted(parameters, &offsets[..count]);
-        let task = Task {
-            set,
-            robot: nominal,
-            parameters,
-            extras: &formulation.rows.extras,
-            rows: &self.fitted,
-            model: formulation.model,
-            smooth: None,
-            settings,
-        };
+        let plain = Task::plain(set, nominal, parameters, &self.fitted, settings);
+        let task = Task { extras: &formulation.rows.extras, model: formulation.model, ..plain };
         let rows = task.rows_at(formulation.rows.scatter, &load_chain);
         Ok(Placed::new(set, &rows, &offsets, &sensor, &shared, formulation.common))
     }
@@ -64,16 +56,10 @@ impl Identification {
         let mut extras: Vec<Extra> = self.extras.iter().map(|(extra, _)| *extra).collect();
         extras.extend(turned.iter().filter(|t| !self.extras.iter().any(|(e, _)| e == *t)));
         let parameters = self.terms.parameters(nominal);
-        Formulation::new(&Task {
-            set,
-            robot: nominal,
-            parameters: &parameters,
-            extras: &extras,
-            rows: &self.fitted,
-            model: if oriented { Model::Pose } else { Model::Position },
-            smooth: self.smooth.map(|told| told.error),
-            settings,
-        })
+        let plain = Task::plain(set, nominal, &parameters, &self.fitted, settings);
+        let (model, smooth) =
+            (if oriented { Model::Pose } else { Model::Position }, self.smooth.map(|told| told.error));
+        Formulation::new(&Task { extras: &extras, model, smooth, ..plain })
     }
 }
 

@@ -1,12 +1,25 @@
 //! What the steps of an identification share, and how much the rows tell.
 
+use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::judge::smooth;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::{Parameter, Robot};
+
+/// Rows that are far from what the others predict.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Gross {
+    /// Left out of the fit.
+    pub outliers: Vec<usize>,
+    /// Fitted.
+    pub doubtful: Vec<usize>,
+    /// Verify rows.
+    pub of_verify: Vec<usize>,
+}
 
 /// What all steps share.
 pub(super) struct Session<'a> {
@@ -22,18 +35,24 @@ pub(super) struct Session<'a> {
 
 impl Session<'_> {
     pub(super) fn task<'b>(&'b self, parameters: &'b [Parameter], model: Model) -> Task<'b> {
-        let Session { set, robot, settings, .. } = *self;
         let extras = if model == Model::PairwiseDistance { &[] } else { self.extras.as_slice() };
-        Task {
-            set,
-            robot,
-            parameters,
-            extras,
-            rows: &self.rows,
-            model,
-            smooth: self.smooth.map(|told| told.error),
-            settings,
+        let plain = Task::plain(self.set, self.robot, parameters, &self.rows, self.settings);
+        Task { extras, model, smooth: self.smooth.map(|told| told.error), ..plain }
+    }
+
+    /// Leaves out the rows that a robust fit gives no weight, and names them; and others that are far off.
+    pub(super) fn drop_outliers(&mut self, model: Model, terms: &Terms) -> Result<Gross, Error> {
+        let sigmas = self.settings.outlier_sigmas;
+        if sigmas <= 0.0 {
+            return Ok(Gross::default());
         }
+        let parameters = terms.parameters(self.robot);
+        let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
+        let outliers = robust.gross_errors(sigmas);
+        let doubtful = robust.doubtful(&outliers);
+        let of_verify = robust.far_off(&self.set.verify_rows(), sigmas);
+        self.rows.retain(|r| !outliers.contains(r));
+        Ok(Gross { outliers, doubtful, of_verify })
     }
 
     /// Numbers that were measured, less the unknowns of the placements.

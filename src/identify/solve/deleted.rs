@@ -12,6 +12,9 @@
 //! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
 //! thousand would have such a row by chance.
 
+use std::collections::BTreeSet;
+use std::ops::Range;
+
 use nalgebra::{Cholesky, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -114,18 +117,15 @@ impl Robust<'_> {
 
     /// Of other rows those that are so many standard deviations of reading and prediction off.
     pub fn far_off(&self, others: &[usize], sigmas: f64) -> Vec<usize> {
-        let mut rows = [self.task.rows, others].concat();
-        rows.sort_unstable();
-        rows.dedup();
+        let rows: BTreeSet<usize> = self.task.rows.iter().chain(others).copied().collect();
+        let rows: Vec<usize> = rows.into_iter().collect();
         let mut weights = self.weights.clone();
         others.iter().for_each(|&row| weights[row] = NEGLIGIBLE);
         let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
         let deleted = with.deleted();
-        let mut far: Vec<usize> = others.iter().copied().filter(|&r| deleted[r].size() > sigmas).collect();
-        far.extend(self.far_off_alone(others, sigmas));
-        far.sort_unstable();
-        far.dedup();
-        far
+        let far = others.iter().copied().filter(|&r| deleted[r].size() > sigmas);
+        let far: BTreeSet<usize> = far.chain(self.far_off_alone(others, sigmas)).collect();
+        far.into_iter().collect()
     }
 
     /// The same of placements of which no row is fitted: nothing says where they are but their own rows, of which most are right.
@@ -133,9 +133,8 @@ impl Robust<'_> {
         let set = self.task.set;
         let mut far = Vec::new();
         for group in 0..set.groups.len() {
-            let of = |row: &&usize| set.poses[**row].group == group;
-            let rows: Vec<usize> = others.iter().filter(of).copied().collect();
-            if rows.len() < LEAST_ALONE || self.task.rows.iter().any(|row| of(&row)) {
+            let rows = set.of_group(others, group);
+            if rows.len() < LEAST_ALONE || !set.of_group(self.task.rows, group).is_empty() {
                 continue;
             }
             let alone = Task { rows: &rows, robot: &self.robot, parameters: &[], extras: &[], ..self.task };
@@ -157,36 +156,35 @@ impl Robust<'_> {
 
     fn all_deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
         let (rows, problem, prior) = self.linearised();
-        let of_block = |(block, placement): (&'_ Block, &'_ Placement)| {
+        let of_placement = |placement: &Placement| {
             let Eliminated { normal, follow, inverse } = placement.eliminated();
-            let jacobian = &placement.linear.jacobian - &placement.linear.design * follow;
-            let known = if let Block::Touch(touch) = block { touch.known.clone() } else { Vec::new() };
-            (normal, (placement.poses.clone(), placement.linear.clone(), inverse, jacobian, known))
+            (normal, (inverse, &placement.linear.jacobian - &placement.linear.design * follow))
         };
-        let (normals, parts): (Vec<DMatrix<f64>>, Vec<_>) =
-            rows.blocks.iter().zip(&problem.placements).map(of_block).unzip();
+        let (normals, parts): (Vec<DMatrix<f64>>, Vec<_>) = problem.placements.iter().map(of_placement).unzip();
         let covariance = pseudo_inverse(normals.iter().fold(prior.clone(), |sum, normal| sum + normal));
         let weight = |row: usize| self.weights.get(row).copied().unwrap_or(1.0);
-        let predicting = parts.iter().flat_map(|(poses, ..)| poses.iter().flatten());
+        let predicting = problem.placements.iter().flat_map(|placement| placement.poses.iter().flatten());
         let most = predicting.filter(|&&pose| weight(rows.rows[pose]) > NEGLIGIBLE).count().max(1) as f64;
         let (mut squares, mut numbers, mut unknowns) = (0.0, 0usize, 0);
         let mut deleted = vec![Deleted::default(); self.task.set.poses.len()];
         let mut of_known = vec![0.0; self.task.set.known.len()];
-        for (poses, linear, own, jacobian, known) in &parts {
+        for ((block, placement), (own, jacobian)) in rows.blocks.iter().zip(&problem.placements).zip(&parts) {
+            let known = if let Block::Touch(touch) = block { touch.known.as_slice() } else { &[] };
             unknowns += own.nrows();
-            let held = |at: &std::ops::Range<usize>| {
+            let linear = &placement.linear;
+            let held = |at: &Range<usize>| {
                 let residual = linear.residuals.rows(at.start, at.len()).into_owned();
                 let (columns, design) = (jacobian.rows(at.start, at.len()), linear.design.rows(at.start, at.len()));
                 let leverage = columns * &covariance * columns.transpose() + design * own * design.transpose();
                 (residual, leverage)
             };
             // The known distances stand behind the touches.
-            for (at, (index, _)) in (poses.len() - known.len()..poses.len()).zip(known) {
+            let count = placement.poses.len();
+            for (at, (index, _)) in (count - known.len()..count).zip(known) {
                 let (residual, leverage) = held(&(at..at + 1));
                 of_known[*index] = square_of_deleted(&residual, leverage, 1.0).map_or(0.0, |(square, _)| square.sqrt());
             }
-            for at in by_pose(poses) {
-                let Some(pose) = poses[at.start] else { continue };
+            for (pose, at) in placement.by_pose() {
                 let row = rows.rows[pose];
                 let (residual, leverage) = held(&at);
                 if weight(row) > NEGLIGIBLE {
@@ -232,13 +230,4 @@ fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64)
     let odds = ((&predicted + predicted.transpose()) / 2.0).symmetric_eigenvalues().max() / (weight * weight);
     let variance = predicted + identity * (weight * weight);
     Some((residual.dot(&Cholesky::new((&variance + variance.transpose()) / 2.0)?.solve(&residual)), odds))
-}
-
-/// Neighbouring residuals of one pose.
-fn by_pose(poses: &[Option<usize>]) -> impl Iterator<Item = std::ops::Range<usize>> {
-    let mut start = 0;
-    poses.chunk_by(|a, b| a == b).map(move |chunk| {
-        start += chunk.len();
-        start - chunk.len()..start
-    })
 }

@@ -5,13 +5,12 @@
 
 use std::borrow::Cow;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::fit::Fit;
-use super::freedom;
 use super::problem::Solution;
 use super::scatter::estimate_scatter;
-use super::task::{FIRST_SCATTER_MM, Task, prior_rows, with_scale_held};
+use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
 use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
@@ -45,11 +44,9 @@ const NO_ZERO_MM: f64 = 10.0;
 /// Everything the solvers share.
 #[derive(Debug, Clone)]
 pub struct Formulation {
-    /// What counts as a residual.
     pub model: Model,
     /// Residuals with their final weights.
     pub rows: Rows,
-    /// What the poses determine.
     pub base: Base,
     /// Half-widths of the box, one a base parameter, mm and mrad.
     pub bounds: Vec<f64>,
@@ -85,33 +82,32 @@ impl Formulation {
         }
         let tolerance = estimate.tolerance;
         let (rows, base, free_fit) = estimate.settled(held)?;
-        let free = vec![f64::INFINITY; free_fit.x.len()];
-        let spread = tolerance.spread(&base, task.parameters);
-        let none = DMatrix::zeros(0, free_fit.x.len());
-        let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &base, spread, &free, none).normal(&free_fit.x);
-        let most = match held {
-            true => likelihood(&base, task, &normal, &gradient).at_most(&tolerance),
-            false => tolerance,
-        };
         let (bounds, widened) = bounds(&base, task.parameters, &free_fit.x, task.settings);
-        Ok(Formulation {
+        let mut formulation = Formulation {
             model: task.model,
             rows,
             base,
             bounds,
             widened,
             tolerance,
-            most,
+            most: tolerance,
             held,
             free_fit,
             scale_seen: task.scale_is_seen(),
             common: 1.0,
-        })
+        };
+        if held {
+            let (normal, gradient) = formulation.normal();
+            let (base, Task { parameters, extras, .. }) = (&formulation.base, *task);
+            let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
+            formulation.most = data.at_most(&tolerance);
+        }
+        Ok(formulation)
     }
 
     /// The parameters that the vector of all offsets stands for.
     pub fn parameters(&self) -> &[Parameter] {
-        self.rows.kinematics.parameters()
+        &self.rows.kinematics.parameters
     }
 
     /// Offsets of all parameters and extras where the free fit ended.
@@ -137,15 +133,8 @@ impl Formulation {
 
     /// Rows of the prior of these standard deviations; none without one.
     fn prior(&self, tolerance: &Tolerance, extras: &[Extra]) -> DMatrix<f64> {
-        let rows = match self.held {
-            true => tolerance.rows(&self.base, self.parameters(), extras),
-            false => DMatrix::zeros(0, self.base.rank() + extras.len()),
-        };
-        let nominal = self.rows.kinematics.nominal();
-        match self.scale_seen {
-            true => rows,
-            false => with_scale_held(rows, tolerance, &self.base, self.parameters(), nominal),
-        }
+        let unscaled = (!self.scale_seen).then_some(&self.rows.kinematics.nominal);
+        prior_rows(tolerance, &self.base, self.parameters(), extras, self.held, unscaled)
     }
 
     /// The problem in its box, the sensor's errors fixed where the free fit found them.
@@ -171,12 +160,12 @@ impl Formulation {
     }
 
     fn covariance_with(&self, tolerance: &Tolerance) -> DMatrix<f64> {
-        let free = vec![f64::INFINITY; self.free_fit.x.len()];
-        let prior = self.prior(tolerance, &self.rows.extras);
-        let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, prior.clone());
-        let (_, jacobian) = fit.white(&self.free_fit.x);
-        let data = product(&jacobian, &jacobian);
-        let covariance = pseudo_inverse(&data + prior.tr_mul(&prior));
+        let (prior, (data, _)) = (self.prior(tolerance, &self.rows.extras), self.normal());
+        self.with_common(pseudo_inverse(&data + prior.tr_mul(&prior)), data)
+    }
+
+    /// A covariance that follows from independent errors, the part of the data as much larger as errors that rows share make it.
+    fn with_common(&self, covariance: DMatrix<f64>, data: DMatrix<f64>) -> DMatrix<f64> {
         let more = &covariance * data * &covariance * (self.common - 1.0);
         covariance + more
     }
@@ -184,10 +173,8 @@ impl Formulation {
     /// The data, linear in the unknowns (base parameters, extras), without a prior: the product of the white Jacobian with itself, and with
     /// the white residuals at offset zero.
     pub fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
-        let count = self.free_fit.x.len();
-        let free = vec![f64::INFINITY; count];
-        let fit = Fit::new(Cow::Borrowed(&self.rows), &self.base, self.spread(), &free, DMatrix::zeros(0, count));
-        fit.normal(&self.free_fit.x)
+        let none = DMatrix::zeros(0, self.free_fit.x.len());
+        Fit::free(&self.rows, &self.base, self.spread(), none).normal(&self.free_fit.x)
     }
 
     /// Covariance of all parameters of the robot as far as the poses determine them.
@@ -221,9 +208,7 @@ impl Formulation {
         let data = product(&jacobian, &jacobian);
         let sds = DMatrix::from_diagonal(&DVector::from_vec(sds));
         let before = DMatrix::identity(sds.nrows(), sds.nrows());
-        let covariance = &sds * pseudo_inverse(before + &sds * &data * &sds) * &sds;
-        let more = &covariance * data * &covariance * (self.common - 1.0);
-        covariance + more
+        self.with_common(&sds * pseudo_inverse(before + &sds * &data * &sds) * &sds, data)
     }
 
     /// Base parameters about which the data say next to nothing: as uncertain as before.
@@ -248,8 +233,6 @@ struct Estimate<'a> {
     x: Vec<f64>,
     /// The robot on whose chain weights have their levers.
     load_chain: Robot,
-    /// Number of unknowns that the data have determined.
-    effective: f64,
 }
 
 impl<'a> Estimate<'a> {
@@ -258,67 +241,61 @@ impl<'a> Estimate<'a> {
     fn new(task: &'a Task<'a>) -> Result<Estimate<'a>, Error> {
         let load_chain = task.robot.clone();
         let scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
-        let rows = Rows::new(&task.spec(scatter, &[], &load_chain));
+        let rows = task.rows_at(scatter, &load_chain);
         let base = task.base(&rows)?;
         task.check_count(&rows, &base)?;
         let x = vec![0.0; base.rank() + task.extras.len()];
         let scatter = estimate_scatter(&rows, &vec![0.0; rows.offset_count()], 0.0, None, scatter);
-        Ok(Estimate { task, base, scatter, tolerance: Tolerance::default(), x, load_chain, effective: 0.0 })
+        Ok(Estimate { task, base, scatter, tolerance: Tolerance::START, x, load_chain })
+    }
+
+    fn rows(&self) -> Rows {
+        self.task.rows_at(self.scatter, &self.load_chain)
+    }
+
+    fn fit<'b>(&'b self, rows: &'b Rows, prior: DMatrix<f64>) -> Fit<'b> {
+        Fit::free(rows, &self.base, self.tolerance.spread(&self.base, self.task.parameters), prior)
     }
 
     fn round(&mut self, round: usize, held: bool) {
-        let task = self.task;
-        let rows = Rows::new(&task.spec(self.scatter, &[], &self.load_chain));
-        let free = vec![f64::INFINITY; self.x.len()];
+        let (task, rows) = (self.task, self.rows());
         if held {
-            let spread = self.tolerance.spread(&self.base, task.parameters);
-            let none = DMatrix::zeros(0, self.x.len());
-            let (normal, gradient) = Fit::new(Cow::Borrowed(&rows), &self.base, spread, &free, none).normal(&self.x);
-            self.tolerance = likelihood(&self.base, task, &normal, &gradient).most_probable();
+            let (normal, gradient) = self.fit(&rows, DMatrix::zeros(0, self.x.len())).normal(&self.x);
+            let (base, Task { parameters, extras, .. }) = (&self.base, *task);
+            let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
+            self.tolerance = data.most_probable();
         }
-        let prior = prior_rows(&self.tolerance, &self.base, task, held || round == 0);
-        let spread = self.tolerance.spread(&self.base, task.parameters);
-        let fit = Fit::new(Cow::Borrowed(&rows), &self.base, spread, &free, prior.clone());
+        let fit = self.fit(&rows, task.prior_rows(&self.tolerance, &self.base, held || round == 0));
         let x = trust_region::solve(&fit, &self.x, &task.settings.trust_region).x;
         let offsets = fit.offsets(&x);
-        self.effective = determined(&fit, &x, &prior);
-        let lost = (task.model == Model::Pose).then(|| freedom::lost(&fit, &x, &prior)).flatten();
-        self.scatter = estimate_scatter(&rows, &offsets, self.effective, lost, self.scatter);
-        self.load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+        let lost = (task.model == Model::Pose).then(|| fit.lost(&x)).flatten();
+        self.scatter = estimate_scatter(&rows, &offsets, fit.determined(&x), lost, self.scatter);
+        self.load_chain = task.robot.shifted(task.parameters, &offsets);
         self.x = x;
-        if round < BASES
-            && let Some(richer) = task.richer(&rows, &offsets, &self.base)
-        {
-            let of_base = richer.coordinates(&offsets);
-            self.x = [of_base, self.x.split_off(self.base.rank())].concat();
-            self.base = richer;
+        if round < BASES {
+            task.look_again(&rows, &offsets, &mut self.base, &mut self.x);
         }
     }
 
     /// The fit with scatter and prior as they are, on rows whose levers are on the robot that it ends at.
-    fn settled(self, held: bool) -> Result<(Rows, Base, Solution), Error> {
-        let Estimate { task, base, scatter, tolerance, mut x, load_chain, .. } = self;
-        let mut rows = Rows::new(&task.spec(scatter, &[], &load_chain));
-        let prior = prior_rows(&tolerance, &base, task, held);
-        let spread = tolerance.spread(&base, task.parameters);
-        let free = vec![f64::INFINITY; x.len()];
+    fn settled(mut self, held: bool) -> Result<(Rows, Base, Solution), Error> {
+        let (task, mut rows) = (self.task, self.rows());
+        let prior = task.prior_rows(&self.tolerance, &self.base, held);
+        let bends = task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
         let mut free_fit = None;
         for _ in 0..ROUNDS {
-            let fit = Fit::new(Cow::Borrowed(&rows), &base, spread.clone(), &free, prior.clone());
-            let solved = trust_region::solve(&fit, &x, &task.settings.trust_region);
-            let moved = solved.x.iter().zip(&x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-            x.clone_from(&solved.x);
-            let offsets = fit.offsets(&x);
-            let load_chain = task.robot.shifted(task.parameters, &offsets[..task.parameters.len()]);
+            let fit = self.fit(&rows, prior.clone());
+            let solved = trust_region::solve(&fit, &self.x, &task.settings.trust_region);
+            let moved = solved.x.iter().zip(&self.x).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            self.load_chain = task.robot.shifted(task.parameters, &fit.offsets(&solved.x));
+            rows = self.rows();
+            self.x.clone_from(&solved.x);
             free_fit = Some(solved);
-            let settled = moved < SAME_CHAIN
-                || !task.parameters.iter().any(|p| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..)));
-            rows = Rows::new(&task.spec(scatter, &[], &load_chain));
-            if settled {
+            if moved < SAME_CHAIN || !bends {
                 break;
             }
         }
-        Ok((rows, base, free_fit.ok_or(Error::NotFinite)?))
+        Ok((rows, self.base, free_fit.ok_or(Error::NotFinite)?))
     }
 }
 
@@ -328,25 +305,6 @@ fn whole_spread(spread: DMatrix<f64>, extras: usize) -> DMatrix<f64> {
     let mut whole = spread.resize(rows + extras, columns + extras, 0.0);
     whole.view_mut((rows, columns), (extras, extras)).fill_with_identity();
     whole
-}
-
-fn likelihood<'a>(
-    base: &'a Base,
-    task: &Task<'a>,
-    normal: &'a DMatrix<f64>,
-    gradient: &'a DVector<f64>,
-) -> Likelihood<'a> {
-    Likelihood { base, parameters: task.parameters, extras: task.extras, normal, gradient }
-}
-
-/// Number of unknowns that the data, and not the prior, have determined.
-fn determined(fit: &Fit, x: &[f64], prior: &DMatrix<f64>) -> f64 {
-    let (_, jacobian) = fit.white(x);
-    let normal = product(&jacobian, &jacobian);
-    match Cholesky::new(&normal + prior.tr_mul(prior)) {
-        Some(total) => total.solve(&normal).trace(),
-        None => x.len() as f64,
-    }
 }
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {

@@ -6,6 +6,7 @@
 //! (another placement from some row on, an even drift) would gain.
 //! What goes wrong: where the shared unknowns move the residuals by so much that a linear model does not hold, all of it is only as good as that.
 
+use std::ops::Range;
 use std::rc::Rc;
 
 use nalgebra::{DMatrix, DVector};
@@ -52,6 +53,16 @@ impl Linearised {
 }
 
 impl Placement {
+    /// The residuals of each pose, by its index among the places; they stand beside each other.
+    pub fn by_pose(&self) -> impl Iterator<Item = (usize, Range<usize>)> + '_ {
+        let mut start = 0;
+        let chunks = self.poses.chunk_by(|a, b| a == b);
+        chunks.filter_map(move |chunk| {
+            start += chunk.len();
+            Some((chunk[0]?, start - chunk.len()..start))
+        })
+    }
+
     /// Product of [shared unknowns, residual at offset zero, own unknowns, `more`] with itself, of these residuals.
     pub fn normal(&self, rows: &[usize], more: Option<&DMatrix<f64>>) -> DMatrix<f64> {
         let (shared, own) = (self.linear.jacobian.ncols(), self.linear.design.ncols());
@@ -112,7 +123,7 @@ impl Fresh {
     }
 
     /// Adds the rows from `at.start` to `at.end`, the fresh columns times `by`.
-    pub fn add(&self, to: &mut Products, at: &std::ops::Range<usize>, by: f64) {
+    pub fn add(&self, to: &mut Products, at: &Range<usize>, by: f64) {
         let rows = |m: &DMatrix<f64>| m.rows(at.start, at.len()).into_owned();
         let (fresh, design, jacobian) = (rows(&self.columns), rows(&self.linear.design), rows(&self.linear.jacobian));
         let shared = jacobian.ncols();

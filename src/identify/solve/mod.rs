@@ -3,7 +3,6 @@
 mod deleted;
 pub mod fit;
 pub mod formulation;
-mod freedom;
 pub mod linearised;
 pub mod problem;
 pub mod robust;

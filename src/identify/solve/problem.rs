@@ -16,14 +16,9 @@ pub trait Problem: Sync {
     /// The residuals at `x` and their derivatives, a column a parameter.
     fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>);
 
-    /// Half the sum of the squared residuals.
-    fn cost(&self, x: &[f64]) -> f64 {
-        0.5 * self.residuals(x).norm_squared()
-    }
-
     /// The cost of many points that stand one after the other in `xs`. The same for any number of threads.
     fn costs(&self, xs: &[f64]) -> Vec<f64> {
-        xs.par_chunks(self.lower().len().max(1)).map(|x| self.cost(x)).collect()
+        xs.par_chunks(self.lower().len().max(1)).map(|x| 0.5 * self.residuals(x).norm_squared()).collect()
     }
 
     /// Number of parameters.
@@ -56,7 +51,6 @@ pub struct Solution {
     /// The best point.
     pub x: Vec<f64>,
     pub cost: f64,
-    /// Iterations made.
     pub iterations: usize,
     /// Evaluations of the residuals; a Jacobian counts as one for each of its columns.
     pub evaluations: usize,
@@ -64,6 +58,5 @@ pub struct Solution {
     pub history: Vec<f64>,
     /// Evaluations used at each entry of the history.
     pub history_evaluations: Vec<usize>,
-    /// Why it stopped.
     pub stop: Stop,
 }

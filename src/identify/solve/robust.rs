@@ -3,19 +3,17 @@
 //!
 //! In: a [`Task`]. Out: weights, sizes of residuals in robust standard deviations, the robot and the scatter of the rest.
 
-use std::borrow::Cow;
-
 use nalgebra::DMatrix;
 
 use super::fit::Fit;
 use super::linearised::Linearised;
 use super::scatter::{Residual, robust_scale, robust_scatter, sizes};
-use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
+use super::task::{FIRST_SCATTER_MM, Task};
 use super::trust_region;
 use crate::identify::Error;
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::rows::{RowSpec, Rows};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::Scatter;
 use crate::identify::settings::DescentSettings;
 use crate::robot::Robot;
@@ -23,6 +21,9 @@ use crate::robot::Robot;
 /// Rounds of reweighting, and how many of them only bound the influence of large residuals.
 const ROBUST_ROUNDS: usize = 14;
 const BOUNDED_ROUNDS: usize = 8;
+
+/// Rounds in which the placement of a robot that is not fitted settles.
+const PLACING_ROUNDS: usize = 4;
 
 /// Steps of the trust region between two estimates of weights.
 const STEPS_A_ROUND: usize = 2;
@@ -44,9 +45,8 @@ impl<'a> Task<'a> {
     /// while influence is only bounded, and stays as it is while large residuals lose all weight (Yohai, "High breakdown-point and high
     /// efficiency robust estimates for regression", 1987): a scale that followed would shrink around the rows that happen to fit.
     pub fn robust(&self, loss: Loss) -> Result<Robust<'a>, Error> {
-        let mut scatter = Scatter::of_point(FIRST_SCATTER_MM);
-        let mut weights = vec![1.0; self.set.poses.len()];
-        let rows = Rows::new(&self.spec(scatter, &[], self.robot));
+        let (scatter, count) = (Scatter::of_point(FIRST_SCATTER_MM), self.set.poses.len());
+        let rows = self.rows_at(scatter, self.robot);
         let base = self.base(&rows)?;
         self.check_count(&rows, &base)?;
         let mut robust = Robust {
@@ -54,7 +54,7 @@ impl<'a> Task<'a> {
             x: vec![0.0; base.rank() + self.extras.len()],
             offsets: vec![0.0; rows.offset_count()],
             robot: self.robot.clone(),
-            weights: Vec::new(),
+            weights: vec![1.0; count],
             scores: Vec::new(),
             scatter,
             base,
@@ -62,34 +62,26 @@ impl<'a> Task<'a> {
         let bounded = if loss == Loss::Biweight { BOUNDED_ROUNDS } else { ROBUST_ROUNDS };
         let mut scale = 1.0;
         for round in 0..ROBUST_ROUNDS {
-            let probe = self.spec(scatter, &weights, &robust.robot);
-            let residuals = Residual::all(&Rows::new(&probe).raw(&robust.offsets));
-            let count = self.set.poses.len();
+            let residuals = robust.residuals();
             if round <= bounded {
                 let freedom = robust.freedom(&residuals, &rows);
                 let both = round > 0 && round % ROUNDS_A_FACTOR == 0;
-                scatter = robust_scatter(&residuals, self.rows, count, freedom, scatter, both);
-                scale = robust_scale(&residuals, self.rows, count, freedom, &scatter);
+                robust.scatter = robust_scatter(&residuals, self.rows, count, freedom, robust.scatter, both);
+                scale = robust_scale(&residuals, self.rows, count, freedom, &robust.scatter);
             }
-            let scores = sizes(&residuals, &scatter, scale, count);
+            robust.scores = sizes(&residuals, &robust.scatter, scale, count);
             for &row in self.rows {
-                let u = scores[row];
-                weights[row] = if round >= bounded { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
+                let u = robust.scores[row];
+                robust.weights[row] = if round >= bounded { biweight(u) } else { (1.0 / u.max(1.0)).sqrt() };
             }
-            robust = Robust { scores, scatter, weights: weights.clone(), ..robust };
             robust.step(STEPS_A_ROUND);
             if round == 0 {
-                robust.look_again(&rows);
+                self.look_again(&rows, &robust.offsets, &mut robust.base, &mut robust.x);
             }
         }
         Ok(robust)
     }
-}
 
-/// Rounds in which the placement of a robot that is not fitted settles.
-const PLACING_ROUNDS: usize = 4;
-
-impl Task<'_> {
     /// What is left of the robot as it is, with nothing but the sensor placed: mean size a coordinate, mm, after a few rounds of bounded
     /// influence, or the first figure that is beyond `hopeless_mm`.
     pub fn unfitted_mm(&self, hopeless_mm: f64) -> f64 {
@@ -107,7 +99,7 @@ impl Task<'_> {
                 break;
             }
             for residual in &residuals {
-                weights[residual.row()] = (typical / residual.size_mm().max(typical).max(f64::MIN_POSITIVE)).sqrt();
+                weights[residual.row] = (typical / residual.size_mm().max(typical).max(f64::MIN_POSITIVE)).sqrt();
             }
         }
         residuals
@@ -151,36 +143,32 @@ pub struct Robust<'a> {
     pub scores: Vec<f64>,
     /// Offsets of parameters and extras.
     pub offsets: Vec<f64>,
-    /// The robot found.
     pub robot: Robot,
     pub scatter: Scatter,
 }
 
 /// The prior of robust fits, where its size is not yet known from the data.
-const LOOSE: Tolerance = Tolerance {
-    lengths_mm: 3.0,
-    angles_mrad: 10.0,
-    target_mm: 100.0,
-    gravity_mrad_per_m: 10.0,
-    harmonics_mrad: 1.0,
-    couplings_per_mille: 1.0,
-    zero_mm: 1.0,
-    warps_per_mille: 1.0,
-};
+const LOOSE: Tolerance = Tolerance { lengths_mm: 3.0, target_mm: 100.0, gravity_mrad_per_m: 10.0, ..Tolerance::START };
 
 impl Robust<'_> {
+    /// The rows with their weights.
+    fn rows(&self) -> Rows {
+        Rows::new(&self.task.spec(self.scatter, &self.weights, &self.robot))
+    }
+
+    fn residuals(&self) -> Vec<Residual> {
+        Residual::all(&self.rows().raw(&self.offsets))
+    }
+
     /// Some steps of the trust region with the weights as they are.
     pub(super) fn step(&mut self, iterations: usize) {
-        let task = self.task;
-        let rows = Rows::new(&RowSpec { weights: &self.weights, ..task.spec(self.scatter, &[], &self.robot) });
-        let free = vec![f64::INFINITY; self.x.len()];
-        let prior = prior_rows(&LOOSE, &self.base, &task, true);
-        let spread = LOOSE.spread(&self.base, task.parameters);
-        let fit = Fit::new(Cow::Owned(rows), &self.base, spread, &free, prior);
+        let (task, rows) = (self.task, self.rows());
+        let prior = task.prior_rows(&LOOSE, &self.base, true);
+        let fit = Fit::free(&rows, &self.base, LOOSE.spread(&self.base, task.parameters), prior);
         let settings = DescentSettings { iterations, ..task.settings.trust_region };
         self.x = trust_region::solve(&fit, &self.x, &settings).x;
         self.offsets = fit.offsets(&self.x);
-        self.robot = task.robot.shifted(task.parameters, &self.offsets[..task.parameters.len()]);
+        self.robot = task.robot.shifted(task.parameters, &self.offsets);
     }
 
     /// The same fit with no residual counting for more than one of `cap` robust standard deviations: with bounded influence alone a row that
@@ -198,36 +186,23 @@ impl Robust<'_> {
 
     /// Mean size of the fitted rows' residuals a coordinate, mm, without the largest tenth of them.
     pub fn typical_mm(&self) -> f64 {
-        let probe = self.task.spec(self.scatter, &self.weights, &self.robot);
-        typical_mm(&Residual::all(&Rows::new(&probe).raw(&self.offsets)))
-    }
-
-    /// Takes in what the poses determine where the fit has come to.
-    fn look_again(&mut self, rows: &Rows) {
-        if let Some(richer) = self.task.richer(rows, &self.offsets, &self.base) {
-            self.x = [richer.coordinates(&self.offsets), self.x.split_off(self.base.rank())].concat();
-            self.base = richer;
-        }
+        typical_mm(&self.residuals())
     }
 
     /// What residuals that were fitted have lost: root of numbers over degrees of freedom.
     fn freedom(&self, residuals: &[Residual], rows: &Rows) -> f64 {
-        let numbers: usize = residuals.iter().map(Residual::count).sum();
+        let numbers: usize = residuals.iter().map(|r| r.count).sum();
         let left = rows.count().saturating_sub(self.x.len()).max(numbers.div_ceil(LEAST_FREEDOM));
         (numbers as f64 / left.max(1) as f64).sqrt()
     }
 
     /// The rows with their weights, linearised where the fit ended, and the normal matrix of a loose prior on all parameters.
     pub fn linearised(&self) -> (Rows, Linearised, DMatrix<f64>) {
-        let spec = self.task.spec(self.scatter, &[], &self.robot);
-        let rows = Rows::new(&RowSpec { weights: &self.weights, ..spec });
+        let rows = self.rows();
         let count = self.offsets.len();
-        let mut prior = DMatrix::zeros(count, count);
+        let mut prior = DMatrix::identity(count, count);
         for (i, &parameter) in self.task.parameters.iter().enumerate() {
             prior[(i, i)] = LOOSE.of(parameter).powi(-2);
-        }
-        for i in self.task.parameters.len()..count {
-            prior[(i, i)] = 1.0;
         }
         let linearised = Linearised::new(&rows, &self.offsets);
         (rows, linearised, prior)

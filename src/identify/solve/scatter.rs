@@ -7,9 +7,8 @@
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
-use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::{EVIDENCE, Scatter};
+use crate::identify::sensor::{EVIDENCE, Raw, Scatter};
 use crate::statistics::median;
 
 /// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
@@ -44,10 +43,11 @@ struct Number {
 /// The residual of a row: a length, or a point along the axes of its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Residual {
-    row: usize,
+    /// Of the data set.
+    pub(super) row: usize,
     weight: f64,
     numbers: [Number; 3],
-    count: usize,
+    pub(super) count: usize,
 }
 
 impl Number {
@@ -82,18 +82,9 @@ impl Residual {
         Some(Residual { row, weight, numbers, count })
     }
 
-    /// Its row of the data set.
-    pub(super) fn row(&self) -> usize {
-        self.row
-    }
-
     /// Root mean square of its numbers, mm.
     pub(super) fn size_mm(&self) -> f64 {
         (self.numbers().iter().map(|n| n.square).sum::<f64>() / self.count as f64).sqrt()
-    }
-
-    pub(super) fn count(&self) -> usize {
-        self.count
     }
 
     fn numbers(&self) -> &[Number] {
@@ -172,7 +163,7 @@ pub(super) fn robust_scatter(
 }
 
 /// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart. `lost` is
-/// what the fit took of either ([`super::freedom`]); where it is not known, each number loses the same share to parameters and placements.
+/// what the fit took of either; where it is not known, each number loses the same share to parameters and placements.
 pub(super) fn estimate_scatter(
     rows: &Rows,
     offsets: &[f64],

@@ -10,8 +10,7 @@ use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::{RowSpec, Rows};
-use crate::identify::sensor::SmoothError;
-use crate::identify::sensor::{Extra, Scatter};
+use crate::identify::sensor::{Extra, Scatter, SmoothError};
 use crate::identify::settings::{Model, Prior, Redundancy, Settings};
 use crate::robot::{Parameter, Robot, Unit};
 
@@ -21,7 +20,6 @@ pub const FIRST_SCATTER_MM: f64 = 0.1;
 /// Of what a formulation is made.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
-    /// The measurements.
     pub set: &'a Dataset,
     /// The nominal robot.
     pub robot: &'a Robot,
@@ -31,7 +29,6 @@ pub struct Task<'a> {
     pub extras: &'a [Extra],
     /// Rows to fit.
     pub rows: &'a [usize],
-    /// What counts as a residual.
     pub model: Model,
     /// A smooth error that the points of a placement share.
     pub smooth: Option<SmoothError>,
@@ -86,9 +83,17 @@ impl<'a> Task<'a> {
         self.base_at(rows, &vec![0.0; rows.offset_count()])
     }
 
+    /// Takes in what they determine where a fit has come to.
+    pub(super) fn look_again(&self, rows: &Rows, offsets: &[f64], base: &mut Base, x: &mut Vec<f64>) {
+        if let Some(richer) = self.richer(rows, offsets, base) {
+            *x = [richer.coordinates(offsets), x.split_off(base.rank())].concat();
+            *base = richer;
+        }
+    }
+
     /// What they determine where the target really is, if that is more than where the file has it: a target on the last axes hides what turns
     /// about it. `None` where these offsets do not move it far enough to matter.
-    pub(super) fn richer(&self, rows: &Rows, offsets: &[f64], base: &Base) -> Option<Base> {
+    fn richer(&self, rows: &Rows, offsets: &[f64], base: &Base) -> Option<Base> {
         // The rest of the robot stays nominal: what one orientation of the flange hides is not seen because the links are a little off.
         let mut of_target = vec![0.0; rows.offset_count()];
         for ((at, &offset), parameter) in of_target.iter_mut().zip(offsets).zip(self.parameters) {
@@ -135,29 +140,32 @@ impl<'a> Task<'a> {
         }
         Ok(())
     }
-}
 
-/// Rows of the prior of all unknowns; none where it is not `held`, but for a scale that nothing sees.
-pub(super) fn prior_rows(tolerance: &Tolerance, base: &Base, task: &Task, held: bool) -> DMatrix<f64> {
-    let rows = match held {
-        true => tolerance.rows(base, task.parameters, task.extras),
-        false => DMatrix::zeros(0, base.rank() + task.extras.len()),
-    };
-    if task.scale_is_seen() { rows } else { with_scale_held(rows, tolerance, base, task.parameters, task.robot) }
+    /// Rows of the prior of all unknowns; none where it is not `held`, but for a scale that nothing sees.
+    pub(super) fn prior_rows(&self, tolerance: &Tolerance, base: &Base, held: bool) -> DMatrix<f64> {
+        let unscaled = (!self.scale_is_seen()).then_some(self.robot);
+        prior_rows(tolerance, base, self.parameters, self.extras, held, unscaled)
+    }
 }
 
 /// Standard deviation of the mean relative change of all lengths where nothing measured sees it.
 const HELD_SCALE: f64 = 1e-7;
 
-/// One more row below the prior's: the robot as a whole neither grows nor shrinks. Touches of unknown points fit the better the smaller
-/// all lengths are, and a weak prior would let them collapse.
-pub(super) fn with_scale_held(
-    rows: DMatrix<f64>,
+/// Rows of the prior of these unknowns, none where it is not `held`; and of a robot whose scale nothing sees one more below: as a whole it neither
+/// grows nor shrinks. Touches of unknown points fit the better the smaller all lengths are, and a weak prior would let them collapse.
+pub(super) fn prior_rows(
     tolerance: &Tolerance,
     base: &Base,
     parameters: &[Parameter],
-    robot: &Robot,
+    extras: &[Extra],
+    held: bool,
+    unscaled: Option<&Robot>,
 ) -> DMatrix<f64> {
+    let rows = match held {
+        true => tolerance.rows(base, parameters, extras),
+        false => DMatrix::zeros(0, base.rank() + extras.len()),
+    };
+    let Some(robot) = unscaled else { return rows };
     let spread = tolerance.spread(base, parameters);
     let length = |p: &Parameter| if p.unit() == Unit::Mm { robot.value(*p) } else { 0.0 };
     let lengths = nalgebra::RowDVector::from_iterator(parameters.len(), parameters.iter().map(length));

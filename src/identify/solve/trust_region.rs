@@ -40,12 +40,12 @@ pub fn solve(problem: &dyn Problem, start: &[f64], settings: &DescentSettings) -
     while run.iterations < settings.iterations {
         run.iterations += 1;
         let gradient = jacobian.tr_mul(&residuals);
-        if optimal(&gradient, &jacobian, &residuals, &x, lower, upper, settings.gradient) {
+        let local =
+            Local { problem, residuals: &residuals, jacobian: &jacobian, gradient: &gradient, scale: &scale, cost };
+        if local.is_optimal(&x, settings.gradient) {
             run.stop = Stop::SmallGradient;
             break;
         }
-        let local =
-            Local { problem, residuals: &residuals, jacobian: &jacobian, gradient: &gradient, scale: &scale, cost };
         let stop = local.step(&mut x, &mut radius, &mut run.evaluations, settings);
         (residuals, jacobian) = problem.linearised(&x);
         run.evaluations += 1 + n;
@@ -84,10 +84,10 @@ impl Local<'_> {
         evaluations: &mut usize,
         settings: &DescentSettings,
     ) -> Option<Stop> {
-        let Local { problem, residuals, jacobian, gradient, scale, cost } = *self;
+        let Local { problem, residuals, jacobian, scale, cost, .. } = *self;
         let (lower, upper) = (problem.lower(), problem.upper());
         loop {
-            let step = step_in_box(jacobian, residuals, gradient, x, lower, upper, scale, *radius);
+            let step = self.step_in_box(x, *radius);
             let candidate: Vec<f64> = (0..x.len()).map(|i| (x[i] + step[i]).clamp(lower[i], upper[i])).collect();
             let taken = DVector::from_fn(x.len(), |i, _| candidate[i] - x[i]);
             let predicted = cost - 0.5 * (residuals + jacobian * &taken).norm_squared();
@@ -116,6 +116,56 @@ impl Local<'_> {
             }
         }
     }
+
+    /// The variables that do not sit at a bound that descent would cross.
+    fn free(&self, x: &[f64]) -> Vec<usize> {
+        let (lower, upper, gradient) = (self.problem.lower(), self.problem.upper(), self.gradient);
+        let held = |i: usize| (x[i] <= lower[i] && gradient[i] >= 0.0) || (x[i] >= upper[i] && gradient[i] <= 0.0);
+        (0..x.len()).filter(|&i| !held(i)).collect()
+    }
+
+    fn is_optimal(&self, x: &[f64], tolerance: f64) -> bool {
+        let norm = self.residuals.norm();
+        self.free(x).into_iter().all(|i| {
+            let column = self.jacobian.column(i).norm();
+            column == 0.0 || self.gradient[i].abs() <= tolerance * column * norm
+        })
+    }
+
+    /// The step that minimises the linear model within the radius and the box, by successive fixing of what hits a wall.
+    fn step_in_box(&self, x: &[f64], radius: f64) -> DVector<f64> {
+        let Local { problem, residuals, jacobian, scale, .. } = *self;
+        let (lower, upper) = (problem.lower(), problem.upper());
+        let mut free = self.free(x);
+        let mut step = DVector::zeros(x.len());
+        while !free.is_empty() {
+            let fixed_part = residuals + jacobian * &step;
+            let used = scaled_norm(step.as_slice(), scale);
+            let left = (radius * radius - used * used).max(0.0).sqrt();
+            let scaled = DMatrix::from_fn(jacobian.nrows(), free.len(), |r, c| jacobian[(r, free[c])] / scale[free[c]]);
+            let solution = more_step(scaled, &fixed_part, left);
+            let mut trial = step.clone();
+            for (k, &i) in free.iter().enumerate() {
+                trial[i] = solution[k] / scale[i];
+            }
+            let is_outside = |&i: &usize| x[i] + trial[i] < lower[i] || x[i] + trial[i] > upper[i];
+            let (outside, inside): (Vec<usize>, Vec<usize>) = free.into_iter().partition(is_outside);
+            if outside.is_empty() {
+                return trial;
+            }
+            for i in outside {
+                step[i] = (x[i] + trial[i]).clamp(lower[i], upper[i]) - x[i];
+            }
+            // Cut walls may leave more than the radius; the shortened step still descends.
+            let used = scaled_norm(step.as_slice(), scale);
+            if used >= radius {
+                step *= radius / used;
+                return step;
+            }
+            free = inside;
+        }
+        step
+    }
 }
 
 fn column_norms(jacobian: &DMatrix<f64>) -> Vec<f64> {
@@ -124,71 +174,6 @@ fn column_norms(jacobian: &DMatrix<f64>) -> Vec<f64> {
 
 fn scaled_norm(x: &[f64], scale: &[f64]) -> f64 {
     x.iter().zip(scale).map(|(x, s)| (x * s).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Whether variable `i` sits at a bound that descent would cross.
-fn held(i: usize, gradient: &DVector<f64>, x: &[f64], lower: &[f64], upper: &[f64]) -> bool {
-    (x[i] <= lower[i] && gradient[i] >= 0.0) || (x[i] >= upper[i] && gradient[i] <= 0.0)
-}
-
-fn optimal(
-    gradient: &DVector<f64>,
-    jacobian: &DMatrix<f64>,
-    residuals: &DVector<f64>,
-    x: &[f64],
-    lower: &[f64],
-    upper: &[f64],
-    tolerance: f64,
-) -> bool {
-    let norm = residuals.norm();
-    (0..gradient.len()).filter(|&i| !held(i, gradient, x, lower, upper)).all(|i| {
-        let column = jacobian.column(i).norm();
-        column == 0.0 || gradient[i].abs() <= tolerance * column * norm
-    })
-}
-
-/// The step that minimises the linear model within the radius and the box, by successive fixing of what hits a wall.
-#[allow(clippy::too_many_arguments)] // the state of one iteration; a struct would only rename it
-fn step_in_box(
-    jacobian: &DMatrix<f64>,
-    residuals: &DVector<f64>,
-    gradient: &DVector<f64>,
-    x: &[f64],
-    lower: &[f64],
-    upper: &[f64],
-    scale: &[f64],
-    radius: f64,
-) -> DVector<f64> {
-    let n = x.len();
-    let mut free: Vec<usize> = (0..n).filter(|&i| !held(i, gradient, x, lower, upper)).collect();
-    let mut step = DVector::zeros(n);
-    while !free.is_empty() {
-        let fixed_part = residuals + jacobian * &step;
-        let used = scaled_norm(step.as_slice(), scale);
-        let left = (radius * radius - used * used).max(0.0).sqrt();
-        let scaled = DMatrix::from_fn(jacobian.nrows(), free.len(), |r, c| jacobian[(r, free[c])] / scale[free[c]]);
-        let solution = more_step(scaled, &fixed_part, left);
-        let mut trial = step.clone();
-        for (k, &i) in free.iter().enumerate() {
-            trial[i] = solution[k] / scale[i];
-        }
-        let outside: Vec<usize> =
-            free.iter().copied().filter(|&i| x[i] + trial[i] < lower[i] || x[i] + trial[i] > upper[i]).collect();
-        if outside.is_empty() {
-            return trial;
-        }
-        for &i in &outside {
-            step[i] = (x[i] + trial[i]).clamp(lower[i], upper[i]) - x[i];
-        }
-        // Cut walls may leave more than the radius; the shortened step still descends.
-        let used = scaled_norm(step.as_slice(), scale);
-        if used >= radius {
-            step *= radius / used;
-            return step;
-        }
-        free.retain(|i| !outside.contains(i));
-    }
-    step
 }
 
 /// The minimiser of |J s + r| with |s| <= radius.

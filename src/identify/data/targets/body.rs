@@ -6,8 +6,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
-use crate::geometry::fitted_frame;
-use crate::geometry::{Transform, perturb, rigid_columns, rotation_matrix};
+use crate::geometry::{Transform, fitted_frame, perturb, rigid_columns, rotation_matrix};
 use crate::statistics::median;
 
 /// Scatter that the numbers of a file have at the least, as a share of the targets' extent.
@@ -51,13 +50,22 @@ pub struct Placed {
     pub freedom: usize,
 }
 
+/// The distance of two targets at the poses that show both, by the index of the pose, mm.
+pub fn distances(poses: &[Vec<Sighting>], a: usize, b: usize) -> Vec<(usize, f64)> {
+    let point = |pose: &[Sighting], target: usize| pose.iter().find(|s| s.target == target).map(|s| s.point_mm);
+    let apart = |(index, pose): (usize, &Vec<Sighting>)| Some((index, (point(pose, a)? - point(pose, b)?).norm()));
+    poses.iter().enumerate().filter_map(apart).collect()
+}
+
+/// Coordinate by coordinate the median.
+pub fn middle(points: &[Vector3<f64>]) -> Vector3<f64> {
+    Vector3::from_fn(|axis, _| median(points.iter().map(|p| p[axis])).unwrap_or(0.0))
+}
+
 impl Body {
     /// Of so many targets, from what the poses showed. `None` where no pose shows two of them.
     pub fn new(poses: &[Vec<Sighting>], targets: usize) -> Option<Body> {
-        let apart = |a: usize, b: usize| {
-            let seen = |pose: &&Vec<Sighting>, t: usize| pose.iter().find(|s| s.target == t).map(|s| s.point_mm);
-            median(poses.iter().filter_map(|pose| Some((seen(&pose, a)? - seen(&pose, b)?).norm())))
-        };
+        let apart = |a: usize, b: usize| median(distances(poses, a, b).into_iter().map(|(_, apart)| apart));
         let distances = DMatrix::from_fn(targets, targets, |a, b| if a == b { Some(0.0) } else { apart(a, b) });
         let shown = |t: usize| poses.iter().flatten().filter(|s| s.target == t).count();
         let joined = largest_joined(&distances, &(0..targets).map(shown).collect::<Vec<_>>());
@@ -71,13 +79,10 @@ impl Body {
         let body = Body { places_mm };
         let mirrored =
             Body { places_mm: body.places_mm.iter().map(|p| p.map(|p| Vector3::new(p.x, p.y, -p.z))).collect() };
-        let better = |pose: &&Vec<Sighting>| mirrored.misfit(pose) < body.misfit(pose);
-        let votes = poses.iter().filter(|pose| pose.len() > 3).filter(better).count();
-        let of_many = poses.iter().filter(|pose| pose.len() > 3).count();
-        let body = if 2 * votes > of_many { mirrored } else { body };
-        Some(body.refined(poses, &|samples| {
-            Vector3::from_fn(|axis, _| median(samples.iter().map(|s| s[axis])).unwrap_or(0.0))
-        }))
+        let many: Vec<&Vec<Sighting>> = poses.iter().filter(|pose| pose.len() > 3).collect();
+        let votes = many.iter().filter(|pose| mirrored.misfit(pose) < body.misfit(pose)).count();
+        let body = if 2 * votes > many.len() { mirrored } else { body };
+        Some(body.refined(poses, &middle))
     }
 
     /// Fitted to these poses by least squares, all of them alike.

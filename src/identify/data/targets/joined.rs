@@ -9,12 +9,12 @@ use std::collections::BTreeMap;
 
 use nalgebra::{Matrix3xX, Point3, Vector3};
 
+use super::body::middle;
 use super::merge::{Part, Targets};
 use crate::geometry::{Transform, fitted_frame};
 use crate::measurements::{Measurement, Observed};
 use crate::robot::Robot;
 use crate::robot::tool_fit::Start;
-use crate::statistics::median;
 
 /// Rows of the target that has most, in the placement that shows it most often: three numbers each against placement and tool.
 const FEWEST: usize = 6;
@@ -55,10 +55,10 @@ impl Joined {
         }
         let tool = |seen: &[Seen]| {
             let on_flange = |(row, point): &Seen| {
-                (sensor_from_base[&row.at.group] * nominal.base_from_flange(&row.at.joints_rad())).inverse() * point
+                let flange = nominal.base_from_flange(&row.at.joints_rad());
+                ((sensor_from_base[&row.at.group] * flange).inverse() * point).coords
             };
-            let places: Vec<Point3<f64>> = seen.iter().map(on_flange).collect();
-            Vector3::from_fn(|axis, _| median(places.iter().map(|p| p[axis])).unwrap_or(0.0))
+            middle(&seen.iter().map(on_flange).collect::<Vec<_>>())
         };
         let origin = tool(seen);
         let part = |(name, seen): (&String, &Vec<Seen>)| {
@@ -73,21 +73,8 @@ impl Joined {
             ..row.clone()
         };
         let sigma_mm = (SIGMA_OVER_ROBOT * off_mm).max(LEAST_SIGMA_MM);
-        let (scatter_mm, oriented, findings) = (None, false, Vec::new());
-        Some(Joined {
-            rows: rows.iter().map(of_body).collect(),
-            targets: Targets {
-                scatter_mm,
-                place_sigma_mm: Some(sigma_mm),
-                places_mm,
-                oriented,
-                names,
-                parts,
-                findings,
-            },
-            sensor_from_base,
-            sigma_mm,
-        })
+        let targets = Targets { names, places_mm, place_sigma_mm: Some(sigma_mm), parts, ..Targets::default() };
+        Some(Joined { rows: rows.iter().map(of_body).collect(), targets, sensor_from_base, sigma_mm })
     }
 
     /// What the point of a pose of this group gains, mm, from each coordinate of each part's place that is off by a standard deviation, the pose
@@ -130,8 +117,7 @@ pub fn of_places(
     let is_several = names.len() > 1;
     parts.retain(|_, part| part.place_mm != [0.0; 3]);
     // They are not solved anew.
-    let (scatter_mm, place_sigma_mm, oriented, findings) = (None, Some(0.0), false, Vec::new());
-    let targets = Targets { scatter_mm, place_sigma_mm, places_mm, oriented, names, parts, findings };
+    let targets = Targets { names, places_mm, place_sigma_mm: Some(0.0), parts, ..Targets::default() };
     is_several.then_some((of_body, targets))
 }
 
@@ -141,10 +127,9 @@ fn placements(seen: &[Seen], nominal: &Robot) -> Option<(BTreeMap<String, Transf
     for row in seen {
         groups.entry(&row.0.at.group).or_default().push(row);
     }
-    let joints = |rows: &[&Seen]| rows.iter().map(|(row, _)| row.at.joints_rad()).collect::<Vec<_>>();
-    let points = |rows: &[&Seen]| rows.iter().map(|(_, point)| *point).collect::<Vec<_>>();
     let most = groups.values().max_by_key(|rows| rows.len()).filter(|rows| rows.len() >= FEWEST)?;
-    let fit = nominal.fit_tool(&joints(most), &points(most), Start::Around)?;
+    let (joints, points): (Vec<_>, Vec<_>) = most.iter().map(|(row, point)| (row.at.joints_rad(), *point)).unzip();
+    let fit = nominal.fit_tool(&joints, &points, Start::Around)?;
     let place = |(group, rows): (&&str, &Vec<&Seen>)| {
         let predicted = rows.iter().map(|(row, point)| {
             (nominal.base_from_flange(&row.at.joints_rad()) * Point3::from(fit.tool_mm), *point, 1.0)

@@ -24,7 +24,7 @@ use crate::measurements::{Measurement, Observed};
 const LEAST_VARIANCE: f64 = 1e-6;
 
 /// The targets of a set.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Targets {
     /// Their names, in order of appearance.
     pub names: Vec<String>,
@@ -113,7 +113,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     let stated = rows.iter().all(|r| !matches!(r.observed, Observed::Position { covariance_mm2: None, .. }));
     let mut poses = shown(rows, &names, stated);
     let moved = told_apart(&mut poses, &mut names);
-    let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
+    let seen = sightings(&poses);
     let body = Body::new(&seen, names.len()).ok_or_else(|| Error::Targets {
         message: format!("the rows are of {} targets ({}), but no pose shows two of them", names.len(), names.join(", ")),
         hint: "the robot joins them where one of them has six rows at each place of the sensor and the others two; else one pose at which all of them \
@@ -173,13 +173,16 @@ fn shown<'a>(rows: &'a [Measurement], names: &[String], stated: bool) -> Vec<Sho
     poses
 }
 
+fn sightings(poses: &[Shown]) -> Vec<Vec<Sighting>> {
+    poses.iter().map(|pose| pose.sightings.clone()).collect()
+}
+
 /// Makes targets that moved others from there on; each with the index that it has from there on.
 fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> Vec<(Moved, usize)> {
     let mut list = Vec::new();
     let most = names.len();
     while list.len() < most {
-        let seen: Vec<Vec<Sighting>> = poses.iter().map(|p| p.sightings.clone()).collect();
-        let Some(moved) = moved::next(&seen, names.len()) else { break };
+        let Some(moved) = moved::next(&sightings(poses), names.len()) else { break };
         let new = names.len();
         names.push(format!("{} from {} on", names[moved.target], poses[moved.from].first.at.pose));
         let later = poses[moved.from..].iter_mut().flat_map(|pose| &mut pose.sightings);
@@ -202,29 +205,21 @@ fn moved_targets(poses: &[Shown], moved: &[(Moved, usize)], names: &[String], so
     for (Moved { target, or, from }, new) in moved {
         let either = or.map_or_else(String::new, |or| format!(" or {}", names[or]));
         let joined = [target, new].iter().all(|&&t| sorter.body.places_mm[t].is_some());
-        list.push(Finding {
-            finding: format!(
-                "target {}{either} was moved {} {}: {} from there on",
-                names[*target],
-                if or.is_some() { "about pose" } else { "before" },
-                poses[*from].first.at.pose,
-                match or {
-                    Some(_) => "they stand at another distance",
-                    None => "its distances to the others are other ones",
-                }
-            ),
-            rows: Vec::new(),
-            action: match joined {
-                true if or.is_some() => {
-                    format!("which of them is not told: target {} counts as another one from there on", names[*target])
-                }
-                true => "it counts as another target from there on".to_owned(),
-                false => {
-                    "the poses on the shorter side show too few other targets and are left out; measure them again"
-                        .to_owned()
-                }
-            },
-        });
+        let (at, how) = match or {
+            Some(_) => ("about pose", "they stand at another distance"),
+            None => ("before", "its distances to the others are other ones"),
+        };
+        let pose = &poses[*from].first.at.pose;
+        let name = &names[*target];
+        let action = match joined {
+            true if or.is_some() => {
+                format!("which of them is not told: target {name} counts as another one from there on")
+            }
+            true => "it counts as another target from there on".to_owned(),
+            false => "the poses on the shorter side show too few other targets and are left out; measure them again"
+                .to_owned(),
+        };
+        list.push(Finding::new(format!("target {name}{either} was moved {at} {pose}: {how} from there on"), action));
     }
     list
 }

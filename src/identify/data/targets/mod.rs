@@ -8,5 +8,6 @@ mod sorter;
 #[cfg(test)]
 mod tests;
 
+pub use body::middle;
 pub use joined::{Joined, of_places};
 pub use merge::{Part, Targets, as_one};

@@ -5,7 +5,7 @@
 //! errors make none. The target in most of the distances that step is the one that moved. Steps of less than about three times the
 //! scatter, and within the first or last few poses, are not seen.
 
-use super::body::{LEAST_SCATTER, Sighting};
+use super::body::{LEAST_SCATTER, Sighting, distances};
 use crate::statistics::median;
 
 /// Fewest poses before and after.
@@ -64,13 +64,6 @@ pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
         rival => (target, rival.filter(|rival| !is_told(target, *rival))),
     };
     (most_steps > 0).then_some(Moved { target, or, from })
-}
-
-/// The distance of two targets at the poses that show both, mm.
-fn distances(poses: &[Vec<Sighting>], a: usize, b: usize) -> Vec<(usize, f64)> {
-    let point = |pose: &[Sighting], target: usize| pose.iter().find(|s| s.target == target).map(|s| s.point_mm);
-    let apart = |(index, pose): (usize, &Vec<Sighting>)| Some((index, (point(pose, a)? - point(pose, b)?).norm()));
-    poses.iter().enumerate().filter_map(apart).collect()
 }
 
 /// How clear the clearest step is, and the pose after it; of those before this pose alone, however clear, where one is given.

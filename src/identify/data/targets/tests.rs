@@ -1,9 +1,10 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use super::*;
-use crate::geometry::transform;
+use crate::geometry::{fitted_frame, transform};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::orientations;
+use crate::identify::judge::errors::Judge;
 use crate::identify::synthetic::{self, point};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::robot::Robot;
@@ -26,6 +27,12 @@ fn one(rows: &[Measurement]) -> (Vec<Measurement>, Targets) {
     as_one(rows).unwrap().unwrap()
 }
 
+/// The true robot with the mean of so many targets for its tool.
+fn with_mean(world: &synthetic::World, count: usize) -> Robot {
+    let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
+    Robot { tool_mm: mean, ..world.truth.clone() }
+}
+
 fn refusal(rows: &[Measurement]) -> String {
     as_one(rows).err().unwrap().to_string()
 }
@@ -38,8 +45,7 @@ fn the_mark_point_is_the_mean_and_turns_with_the_flange() {
         assert_eq!((poses.len(), targets.names.len(), targets.oriented), (world.rows.len(), count, true));
         let scatter_mm = targets.scatter_mm.unwrap();
         assert!((scatter_mm / NOISE_MM - 1.0).abs() < 0.15, "{scatter_mm}");
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let truth = with_mean(&world, count);
         let mut turns = Vec::new();
         let mut distances = Vec::new();
         for pair in poses.iter().filter(|p| p.at.group == "g0").collect::<Vec<_>>().windows(2) {
@@ -65,11 +71,7 @@ fn the_mark_point_is_the_mean_and_turns_with_the_flange() {
 fn the_covariance_is_that_of_the_mean() {
     let mut list = rows(3, 5);
     let stated = Matrix3::from_diagonal(&Vector3::new(1e-4, 4e-4, 9e-4));
-    for row in &mut list {
-        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-            *covariance_mm2 = Some(stated);
-        }
-    }
+    synthetic::state(&mut list, |_| Some(stated));
     let (poses, _) = one(&list);
     for pose in &poses {
         let Observed::Position { covariance_mm2: Some(c), .. } = &pose.observed else { panic!() };
@@ -216,31 +218,25 @@ fn single(list: &[Measurement], count: usize, from: usize) -> Vec<Measurement> {
     list.iter().enumerate().filter(|(i, _)| shows(*i)).map(|(_, row)| row.clone()).collect()
 }
 
+/// Mean distance of two robots' points at the poses of a world once their bases are brought together.
+fn mean_miss(world: &synthetic::World, robot: &Robot, truth: &Robot) -> f64 {
+    let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
+    let frame = fitted_frame(joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0)));
+    let miss = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
+    joints.iter().map(miss).sum::<f64>() / joints.len() as f64
+}
+
 #[test]
 fn single_targets_tell_as_much_of_the_robot_as_their_points() {
-    use crate::identify::run::identify;
-    let settings = crate::identify::Settings {
-        method: Some(crate::identify::Method::TrustRegion),
-        ..crate::identify::Settings::default()
-    };
     for (count, from) in [(3, 14), (2, 14)] {
         let world = synthetic::world(40, 0.0, 3);
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
-        let (mut alone, mut all) = (0.0, 0.0);
-        for (rows, off) in
-            [(single(&rows(count, 3), count, from), &mut all), (rows(count, 3)[..count * from].to_vec(), &mut alone)]
-        {
-            let set = Dataset::new(&rows).unwrap();
+        let truth = with_mean(&world, count);
+        let miss = |rows: &[Measurement]| {
+            let (set, found) = world.identified(rows);
             assert_eq!(set.skipped, []);
-            let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
-            let robot = &found.candidates[found.chosen].robot;
-            let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
-            let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
-            let frame = crate::geometry::fitted_frame(pairs);
-            let miss = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
-            *off = joints.iter().map(miss).sum::<f64>() / joints.len() as f64;
-        }
+            mean_miss(&world, found.robot(), &truth)
+        };
+        let (all, alone) = (miss(&single(&rows(count, 3), count, from)), miss(&rows(count, 3)[..count * from]));
         assert!(
             all < 0.05 && all < alone,
             "{count} targets, {from} whole poses: {all} with the single ones, {alone} without"
@@ -250,33 +246,22 @@ fn single_targets_tell_as_much_of_the_robot_as_their_points() {
 
 #[test]
 fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
-    use crate::identify::judge::errors::Judge;
-    use crate::identify::run::identify;
-    let settings = crate::identify::Settings {
-        method: Some(crate::identify::Method::TrustRegion),
-        ..crate::identify::Settings::default()
-    };
     let world = synthetic::world(60, 0.0, 3);
     let truth = Robot { tool_mm: TARGETS[0].1, ..world.truth.clone() };
-    let joints: Vec<Vec<f64>> = world.rows.iter().map(|r| r.at.joints_rad()).collect();
     let miss = |rows: &[Measurement]| {
         let set = Dataset::of_robot(rows, &world.nominal).unwrap();
         assert_eq!((set.skipped.len(), set.poses.len()), (0, rows.len()));
-        let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
-        let robot = &found.candidates[found.chosen].robot;
-        let (extras, values): (Vec<_>, Vec<_>) = found.extras.iter().copied().unzip();
-        let judge = Judge { extras: &extras, values: &values, ..Judge::plain(&set, &found.fitted, true) };
-        let errors = judge.errors(robot, &found.fitted).into_iter().filter_map(|e| e.point_mm).map(|e| e.norm());
+        let found = synthetic::identified(&set, &world.nominal);
+        let judge = Judge { extras: &found.extras, ..Judge::plain(&set, &found.fitted, true) };
+        let errors =
+            judge.errors(found.robot(), &found.fitted).into_iter().filter_map(|e| e.point_mm).map(|e| e.norm());
         assert!(errors.fold(0.0, f64::max) < 10.0 * NOISE_MM);
         let solved = set.targets.clone().map(|targets| targets.solved(&found.extras));
         for (name, part) in solved.iter().flat_map(|targets| &targets.parts) {
             let place = TARGETS.iter().find(|(n, _)| n == name).unwrap().1 - TARGETS[0].1;
             assert!((Vector3::from(part.place_mm) - place).norm() < 2.0, "{name}: {part:?} for {place:?}");
         }
-        let pairs = joints.iter().map(|q| (robot.target_mm(q), truth.target_mm(q), 1.0));
-        let frame = crate::geometry::fitted_frame(pairs);
-        let of = |q: &Vec<f64>| (frame * robot.target_mm(q) - truth.target_mm(q)).norm();
-        joints.iter().map(of).sum::<f64>() / joints.len() as f64
+        mean_miss(&world, found.robot(), &truth)
     };
     let all = synthetic::of_targets(&world, &TARGETS[..3], NOISE_MM, 3);
     // The first is shown by half of the poses, the others by a quarter each.
@@ -291,11 +276,9 @@ fn targets_that_no_pose_shows_together_are_joined_by_the_robot() {
 
 #[test]
 fn few_whole_poses_tell_where_the_single_targets_of_all_others_stand() {
-    use crate::identify::judge::errors::Judge;
     for (count, from) in [(3, 1), (3, 2), (3, 14), (3, 44)] {
         let world = synthetic::world(40, 0.0, 3);
-        let mean = TARGETS[..count].iter().map(|(_, p)| p).sum::<Vector3<f64>>() / count as f64;
-        let truth = Robot { tool_mm: mean, ..world.truth.clone() };
+        let truth = with_mean(&world, count);
         let set = Dataset::new(&single(&rows(count, 3), count, from)).unwrap();
         let fitted: Vec<usize> = (0..set.poses.len()).collect();
         let errors = Judge::plain(&set, &fitted, false).errors(&truth, &fitted);
@@ -316,11 +299,7 @@ fn what_is_no_body_is_refused() {
     assert!(refusal(&list).contains("no rigid body"));
     list.iter_mut().for_each(|row| *point(row) = Point3::new(1.0, 2.0, 3.0));
     assert!(refusal(&list).contains("no rigid body"));
-    let mut list = rows(3, 1);
-    let keep: Vec<bool> = (0..list.len()).map(|i| i % 3 == (i / 3) % 3).collect();
-    let mut kept = keep.iter();
-    list.retain(|_| *kept.next().unwrap());
-    assert!(refusal(&list).contains("no pose shows two"));
+    assert!(refusal(&single(&rows(3, 1), 3, 0)).contains("no pose shows two"));
     let mut list = rows(3, 1);
     for row in &mut list {
         row.observed = Observed::Distance { distance_mm: 5.0, sigma_mm: None };

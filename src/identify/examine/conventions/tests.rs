@@ -1,5 +1,4 @@
 use super::*;
-use crate::identify::data::dataset::Reading;
 use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Observed};
 use crate::tables::names::Unit;
@@ -32,6 +31,13 @@ fn joints(rows: &[Measurement], change: impl Fn(&mut Vec<f64>)) -> Vec<Measureme
     rows
 }
 
+/// The rows with the joints of those before.
+fn late(rows: &[Measurement]) -> Vec<Measurement> {
+    let mut late = rows.to_vec();
+    late.iter_mut().skip(1).zip(rows).for_each(|(row, before)| row.at.joints_deg.clone_from(&before.at.joints_deg));
+    late
+}
+
 fn shifted(rows: &[Measurement], by: impl Fn(usize) -> f64) -> Vec<Measurement> {
     let mut rows = rows.to_vec();
     for (i, row) in rows.iter_mut().enumerate() {
@@ -46,15 +52,6 @@ fn what_a_fit_swallows_where_joints_move_little_is_named() {
         let (world, rows) = one_sphere(8.0, seed);
         let robot = &world.nominal;
         assert_eq!(said(&rows, robot), [""; 0], "clean, seed {seed}");
-        let late: Vec<Measurement> = rows
-            .iter()
-            .enumerate()
-            .map(|(i, row)| {
-                let mut row = row.clone();
-                row.at.joints_deg.clone_from(&rows[i.saturating_sub(1)].at.joints_deg);
-                row
-            })
-            .collect();
         for (wrong, word) in [
             (joints(&rows, |q| q.swap(4, 5)), "joints 5 and 6 are exchanged"),
             (joints(&rows, |q| q.swap(3, 5)), "joints 4 and 6 are exchanged"),
@@ -62,7 +59,7 @@ fn what_a_fit_swallows_where_joints_move_little_is_named() {
             (joints(&rows, |q| q[4] = -q[4]), "joint 5 is counted the other way round"),
             (joints(&rows, |q| q[4] -= 90.0), "joint 5 is offset by 90"),
             (joints(&rows, |q| q[3] += 180.0), "joint 4 is offset by"),
-            (late, "the joints lag 1 row"),
+            (late(&rows), "the joints lag 1 row"),
         ] {
             let said = said(&wrong, robot);
             assert!(said.len() == 1 && said[0].contains(word), "{word}, seed {seed}: {said:?}");
@@ -89,11 +86,7 @@ fn sessions_a_target_elsewhere_and_gross_errors_are_no_convention() {
 #[test]
 fn a_row_whose_joints_are_lost_is_left_out() {
     let (world, rows) = one_sphere(25.0, 2);
-    let mut late = rows.clone();
-    for i in 1..rows.len() {
-        late[i].at.joints_deg.clone_from(&rows[i - 1].at.joints_deg);
-    }
-    let set = Dataset::new(&late).unwrap();
+    let set = Dataset::new(&late(&rows)).unwrap();
     let Mended { set: mended, .. } = examine(&set, &world.nominal, &Settings::default());
     assert_eq!(mended.poses.len(), set.poses.len() - 1);
     assert_eq!(mended.skipped.len(), 1);
@@ -175,11 +168,7 @@ fn rows_in_metres_among_others_are_named_and_speak_against_the_file() {
         assert_eq!(against[0].rows.len(), rows.len().div_ceil(share));
         let right = Dataset::new(&rows).unwrap();
         for (pose, right) in mended.poses.iter().zip(&right.poses) {
-            let (Reading::Position { point_mm: a, .. }, Reading::Position { point_mm: b, .. }) =
-                (&pose.reading, &right.reading)
-            else {
-                continue;
-            };
+            let (a, b) = (pose.reading.point_mm().unwrap(), right.reading.point_mm().unwrap());
             assert!((a - b).norm() < 1e-6);
         }
     }

@@ -5,6 +5,8 @@
 //! a tool that was moved between parts costs one robot nothing. Gauss and Newton's steps with the placements eliminated; the links are held by
 //! a loose prior. Goes wrong: parts whose rows are no more than their unknowns; they leave nothing, and count no degrees of freedom.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
 use crate::geometry::{fitted_frame, rigid_columns};
@@ -74,11 +76,10 @@ impl Left {
         (self.squares / self.freedom()).sqrt()
     }
 
-    /// Weights of all rows without those of these that are gross errors.
-    pub(super) fn weights(&self, rows: &[usize], count: usize) -> Vec<f64> {
-        let (mut weights, limit) = (vec![1.0; count], GROSS * typical_mm(&self.errors_mm));
+    /// Takes the weight of those of its rows that are gross errors.
+    pub(super) fn leave_out_gross(&self, rows: &[usize], weights: &mut [f64]) {
+        let limit = GROSS * typical_mm(&self.errors_mm);
         rows.iter().zip(&self.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| weights[row] = 0.0);
-        weights
     }
 
     pub(super) fn and(mut self, other: Left) -> Left {
@@ -92,35 +93,16 @@ impl Left {
     }
 }
 
-/// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual.
-struct Normal {
-    matrix: DMatrix<f64>,
-    numbers: f64,
-    errors_mm: Vec<f64>,
-}
-
-/// What is left somewhere, and where to go from there.
-struct At {
-    left: Left,
-    step: DVector<f64>,
-}
-
-/// One robot for some parts: their rows, where the unknowns start, and how many steps are taken.
-struct Fit<'a> {
-    parts: &'a [Vec<usize>],
-    x: DVector<f64>,
-    steps: usize,
-}
-
 impl Points {
     /// One robot for all parts.
     pub(super) fn together(&self, parts: &[Vec<usize>], weights: &[f64]) -> Left {
-        self.fitted(self.at_file(parts), weights.to_vec(), &mut |_, _| ()).0
+        self.fitted(parts, self.at_file(parts), STEPS, weights.to_vec(), &mut |_, _| ()).0
     }
 
     /// One robot for these rows with common placements, and where the further tools stand from the first, mm.
     pub(super) fn with_tools(&self, rows: Vec<usize>, weights: &[f64]) -> (Left, Vec<Vector3<f64>>) {
-        let (left, x) = self.fitted(self.at_file(&[rows]), weights.to_vec(), &mut |_, _| ());
+        let parts = [rows];
+        let (left, x) = self.fitted(&parts, self.at_file(&parts), STEPS, weights.to_vec(), &mut |_, _| ());
         let tool = |k: usize| Vector3::from_fn(|axis, _| x[self.parameters.len() + TARGET * k + axis]);
         (left, (0..self.further_tools()).map(tool).collect())
     }
@@ -129,19 +111,11 @@ impl Points {
         self.tools.iter().copied().max().unwrap_or(0)
     }
 
-    /// A robot a part, each with what it leaves.
-    pub(super) fn apart(&self, parts: &[Vec<usize>], weights: &[f64]) -> Vec<Left> {
-        parts.iter().map(|part| self.together(std::slice::from_ref(part), weights)).collect()
-    }
-
     /// One robot for all these rows with the influence of gross errors bounded: where it ends, and what it leaves.
     pub(super) fn bounded(&self, rows: &[usize], near: Option<&DVector<f64>>) -> (Left, DVector<f64>) {
         let parts = [rows.to_vec()];
-        let fit = match near {
-            Some(x) => Fit { parts: &parts, x: x.clone(), steps: STEPS_NEAR },
-            None => self.at_file(&parts),
-        };
-        self.fitted(fit, vec![1.0; self.points_mm.len()], &mut |errors, weights| {
+        let (start, steps) = near.map_or_else(|| (self.at_file(&parts), STEPS), |x| (x.clone(), STEPS_NEAR));
+        self.fitted(&parts, start, steps, vec![1.0; self.points_mm.len()], &mut |errors, weights| {
             let typical = typical_mm(errors);
             for (&row, error) in rows.iter().zip(errors) {
                 weights[row] = (WHOLE * typical / error.max(LEAST_MM)).min(1.0);
@@ -153,35 +127,34 @@ impl Points {
     pub(super) fn without_gross(&self, parts: &[Vec<usize>]) -> Vec<f64> {
         let mut kept = vec![1.0; self.points_mm.len()];
         for part in parts {
-            let (left, _) = self.bounded(part, None);
-            let limit = GROSS * typical_mm(&left.errors_mm);
-            part.iter().zip(&left.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| kept[row] = 0.0);
+            self.bounded(part, None).0.leave_out_gross(part, &mut kept);
         }
         kept
     }
 
-    fn at_file<'a>(&self, parts: &'a [Vec<usize>]) -> Fit<'a> {
-        let count = self.parameters.len() + TARGET * (parts.len() - 1 + self.further_tools());
-        Fit { parts, x: DVector::zeros(count), steps: STEPS }
+    /// The unknowns of some parts where the file has them.
+    fn at_file(&self, parts: &[Vec<usize>]) -> DVector<f64> {
+        DVector::zeros(self.parameters.len() + TARGET * (parts.len() - 1 + self.further_tools()))
     }
 
-    /// What one robot leaves, and where it ends; `weigh` hears the errors after each step and changes the weights of all rows.
+    /// What one robot leaves after so many steps, and where it ends; `weigh` hears the errors after each step and changes the weights of all rows.
     fn fitted(
         &self,
-        fit: Fit,
+        parts: &[Vec<usize>],
+        mut x: DVector<f64>,
+        steps: usize,
         mut weights: Vec<f64>,
         weigh: &mut dyn FnMut(&[f64], &mut [f64]),
     ) -> (Left, DVector<f64>) {
-        let Fit { parts, mut x, steps } = fit;
         let kinematics: Vec<Kinematics> = parts.iter().map(|part| self.kinematics(part)).collect();
-        let mut at = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
+        let (mut left, mut step) = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
         for _ in 0..steps {
-            x += &at.step;
-            weigh(&at.left.errors_mm, &mut weights);
-            let scatter_mm = at.left.scatter_mm().clamp(LEAST_MM, LARGEST_MM);
-            at = self.at(parts, &kinematics, &x, &weights, scatter_mm);
+            x += &step;
+            weigh(&left.errors_mm, &mut weights);
+            let scatter_mm = left.scatter_mm().clamp(LEAST_MM, LARGEST_MM);
+            (left, step) = self.at(parts, &kinematics, &x, &weights, scatter_mm);
         }
-        (at.left, x)
+        (left, x)
     }
 
     /// What is left at these values of the unknowns, and the step from there.
@@ -192,7 +165,7 @@ impl Points {
         x: &DVector<f64>,
         weights: &[f64],
         scatter_mm: f64,
-    ) -> At {
+    ) -> (Left, DVector<f64>) {
         let count = x.len();
         let (normal, mut left) = self.normals(parts, kinematics, x, weights);
         let measured = normal.view((0, 0), (count, count)).into_owned();
@@ -200,7 +173,7 @@ impl Points {
         let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
         left.taken = product(&inverse, &measured).trace();
         let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
-        At { left, step: step.column(0).into_owned() }
+        (left, step.column(0).into_owned())
     }
 
     /// Normal equations of all parts, and what is left there.
@@ -219,13 +192,13 @@ impl Points {
             let further = count - TARGET * self.further_tools();
             let at: Vec<usize> = (0..of_links).chain(target..target + TARGET).chain(further..count).collect();
             let offsets: Vec<f64> = at.iter().map(|&i| x[i]).collect();
-            let of_part = self.normal(part, kinematics, &offsets, weights);
+            let (of_part, numbers, errors_mm) = self.normal(part, kinematics, &offsets, weights);
             let whole: Vec<usize> = at.into_iter().chain([count]).collect();
             for (r, &row) in whole.iter().enumerate() {
-                whole.iter().enumerate().for_each(|(c, &column)| normal[(row, column)] += of_part.matrix[(r, c)]);
+                whole.iter().enumerate().for_each(|(c, &column)| normal[(row, column)] += of_part[(r, c)]);
             }
-            left.numbers += of_part.numbers;
-            left.errors_mm.extend(of_part.errors_mm);
+            left.numbers += numbers;
+            left.errors_mm.extend(errors_mm);
         }
         left.squares = normal[(count, count)];
         (normal, left)
@@ -257,16 +230,21 @@ impl Points {
         (0..TARGET).map(|axis| columns.column(axis) * offsets[at + axis]).sum()
     }
 
-    fn normal(&self, part: &[usize], kinematics: &Kinematics, offsets: &[f64], weights: &[f64]) -> Normal {
+    /// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual; how many numbers were measured
+    /// beyond those of the placements, and the size of each row's error, mm.
+    fn normal(
+        &self,
+        part: &[usize],
+        kinematics: &Kinematics,
+        offsets: &[f64],
+        weights: &[f64],
+    ) -> (DMatrix<f64>, f64, Vec<f64>) {
         let places = kinematics.places(&offsets[..self.parameters.len()], true);
         let kept = offsets.len() + 1;
         let moved: Vec<Point3<f64>> =
             part.iter().zip(&places).map(|(&row, place)| place.point_mm + self.of_tool(row, place, offsets)).collect();
-        let mut sum = Normal { matrix: DMatrix::zeros(kept, kept), numbers: 0.0, errors_mm: vec![0.0; part.len()] };
-        let mut groups: Vec<usize> = part.iter().map(|&row| self.groups[row]).collect();
-        groups.sort_unstable();
-        groups.dedup();
-        for group in groups {
+        let (mut normal, mut numbers, mut errors_mm) = (DMatrix::zeros(kept, kept), 0.0, vec![0.0; part.len()]);
+        for group in part.iter().map(|&row| self.groups[row]).collect::<BTreeSet<usize>>() {
             let of_group: Vec<usize> = (0..part.len()).filter(|&i| self.groups[part[i]] == group).collect();
             let pair = |&i: &usize| (self.points_mm[part[i]], moved[i], weights[part[i]]);
             let weight: f64 = of_group.iter().map(|&i| weights[part[i]]).sum();
@@ -279,7 +257,7 @@ impl Points {
             for (k, &i) in of_group.iter().enumerate() {
                 let root = weights[part[i]].sqrt();
                 let error: Vector3<f64> = frame * self.points_mm[part[i]] - moved[i];
-                sum.errors_mm[i] = error.norm();
+                errors_mm[i] = error.norm();
                 let mut rows = columns.rows_mut(TARGET * k, TARGET);
                 rows.columns_mut(0, self.parameters.len()).copy_from(&(root * &places[i].point_columns));
                 if let Some(at) = self.further_tool(part[i]) {
@@ -289,9 +267,9 @@ impl Points {
                 rows.column_mut(kept - 1).copy_from(&(root * error));
                 rows.columns_mut(kept, PLACEMENT).copy_from(&(root * rigid_columns(&moved[i].coords)));
             }
-            sum.numbers += TARGET as f64 * weight - PLACEMENT as f64;
-            sum.matrix += Eliminated::new(&product(&columns, &columns), kept).normal;
+            numbers += TARGET as f64 * weight - PLACEMENT as f64;
+            normal += Eliminated::new(&product(&columns, &columns), kept).normal;
         }
-        sum
+        (normal, numbers, errors_mm)
     }
 }

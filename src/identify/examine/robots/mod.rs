@@ -17,10 +17,9 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use self::fit::{Left, Points};
-use crate::identify::data::dataset::{Dataset, Kind, Reading};
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::examine::hypothesis::still;
-use crate::identify::examine::sessions;
-use crate::identify::examine::shifted;
+use crate::identify::examine::{sessions, shifted};
 use crate::identify::finding::Finding;
 use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::settings::Settings;
@@ -198,10 +197,7 @@ impl Table {
             return None;
         }
         let rows = without_lone(set, robot, set.fit_rows());
-        let point = |row: &usize| match &set.poses[*row].reading {
-            Reading::Position { point_mm, .. } => Some(*point_mm),
-            _ => None,
-        };
+        let point = |row: &usize| set.poses[*row].reading.point_mm();
         let points = Points {
             robot: robot.clone(),
             parameters: robot.mdh_parameters(),
@@ -264,11 +260,8 @@ impl Table {
     fn judged(&self, parts: Vec<Vec<usize>>, tried: usize) -> Option<Judged> {
         let compared = self.compared(&parts)?;
         let Compared { apart, together, .. } = &compared;
-        let further = apart.taken - together.taken;
-        let gain = ((together.squares - apart.squares) / further) / (apart.squares / apart.freedom());
-        let fisher = FisherSnedecor::new(further.max(1.0), apart.freedom()).ok()?;
         if together.scatter_mm() < (MUCH_LARGER * apart.scatter_mm()).max(REPEATABILITY_MM)
-            || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE
+            || by_chance(apart, together)? * tried as f64 > CHANCE
         {
             return None;
         }
@@ -284,7 +277,8 @@ impl Table {
     /// What robots of their own leave in these parts, and what one leaves.
     fn compared(&self, parts: &[Vec<usize>]) -> Option<Compared> {
         let weights = self.points.without_gross(parts);
-        let each = self.points.apart(parts, &weights);
+        let alone = |part: &Vec<usize>| self.points.together(std::slice::from_ref(part), &weights);
+        let each: Vec<Left> = parts.iter().map(alone).collect();
         let apart = each.iter().cloned().reduce(Left::and)?;
         Some(Compared { each, apart, together: self.points.together(parts, &weights) })
     }
@@ -308,6 +302,13 @@ impl Compared {
     fn share(&self) -> f64 {
         self.apart.scatter_mm() / self.together.scatter_mm()
     }
+}
+
+/// Chance that the further unknowns of rows that are taken apart gain as much as they do (Fisher's test).
+fn by_chance(apart: &Left, together: &Left) -> Option<f64> {
+    let further = apart.taken - together.taken;
+    let gain = ((together.squares - apart.squares) / further) / (apart.squares / apart.freedom());
+    Some(FisherSnedecor::new(further.max(1.0), apart.freedom()).ok()?.sf(gain.max(0.0)))
 }
 
 /// Whether two ways to part rows are nearly one.

@@ -1,7 +1,8 @@
-use nalgebra::Vector3;
+use nalgebra::{Point3, Vector3};
 
 use super::*;
-use crate::geometry::transform;
+use crate::geometry::{Transform, transform};
+use crate::identify::data::dataset::{Pose, Reading};
 use crate::identify::synthetic::{World, planned, point};
 use crate::measurements::{Measurement, Role};
 
@@ -26,7 +27,7 @@ fn tables(worlds: &[World], files: bool) -> (Dataset, Robot) {
         rows.extend(of_sphere.cloned().map(|mut row| {
             let name = format!("{}:", k + 1);
             row.at.group = if files { name.clone() + "1" } else { "1".into() };
-            row.at.pose = if files { name + &row.at.pose } else { rows_name(k, &row.at.pose) };
+            row.at.pose = if files { name } else { ["a", "b", "c"][k].to_owned() } + &row.at.pose;
             row
         }));
     }
@@ -35,8 +36,16 @@ fn tables(worlds: &[World], files: bool) -> (Dataset, Robot) {
     (set, worlds[0].nominal.clone())
 }
 
-fn rows_name(table: usize, pose: &str) -> String {
-    format!("{}{pose}", ["a", "b", "c"][table])
+/// Moves the points of all rows from one on, as a sensor that was moved there.
+fn move_from(set: &mut Dataset, row: usize, moved: Transform) {
+    for pose in &mut set.poses[row..] {
+        *point_of(pose) = moved * *point_of(pose);
+    }
+}
+
+fn point_of(pose: &mut Pose) -> &mut Point3<f64> {
+    let Reading::Position { point_mm, .. } = &mut pose.reading else { panic!("a point") };
+    point_mm
 }
 
 fn found(set: &Dataset, robot: &Robot) -> Option<Robots> {
@@ -99,15 +108,8 @@ fn one_robot_is_one_whatever_was_moved_beside_it() {
             assert_eq!(found(&set, &robot), None, "seed {seed}, a tool {tool_mm} mm elsewhere, files {files}");
             let moved = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
             let half = set.poses.len() / 2;
-            for (i, pose) in set.poses.iter_mut().enumerate() {
-                let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
-                if i > half {
-                    *point_mm = moved * *point_mm;
-                }
-                if i % 9 == 4 {
-                    point_mm.x += 3.0;
-                }
-            }
+            move_from(&mut set, half + 1, moved);
+            set.poses.iter_mut().skip(4).step_by(9).for_each(|pose| point_of(pose).x += 3.0);
             assert_eq!(found(&set, &robot), None, "seed {seed}, camera moved, gross errors, files {files}");
         }
     }
@@ -127,19 +129,28 @@ fn cameras_that_moved_several_times_are_no_robots() {
     }
 }
 
+/// Gears and the weight of the arm, which the links do not describe, in rows as they come and in the order of a joint.
+fn lacking(seed: u64, weighed: usize, by_deg: f64, order: usize) -> [(Dataset, Robot); 2] {
+    let mut world = planned(160, 0, 25.0, 0.02, seed, &|_| {});
+    world.rows.retain(|row| row.at.role != Role::Center);
+    for row in &mut world.rows {
+        row.at.joints_deg[1] += 0.1 * (2.0 * row.at.joints_deg[1].to_radians()).sin();
+        row.at.joints_deg[weighed] += by_deg * row.at.joints_deg[weighed].to_radians().cos();
+    }
+    let as_they_come = Dataset::new(&world.rows).unwrap();
+    world.rows.sort_by(|a, b| a.at.joints_deg[order].total_cmp(&b.at.joints_deg[order]));
+    [as_they_come, Dataset::new(&world.rows).unwrap()].map(|set| (set, world.nominal.clone()))
+}
+
 #[test]
-fn what_a_model_lacks_makes_no_robots() {
+fn what_a_model_lacks_makes_no_robots_and_moves_no_tool() {
     for seed in 0..8 {
-        // Gears and the weight of the arm, which the links do not describe, in rows in the order of a joint.
-        let mut world = planned(160, 0, 25.0, 0.02, seed, &|_| {});
-        world.rows.retain(|row| row.at.role != Role::Center);
-        for row in &mut world.rows {
-            row.at.joints_deg[1] += 0.1 * (2.0 * row.at.joints_deg[1].to_radians()).sin();
-            row.at.joints_deg[2] += 0.1 * row.at.joints_deg[2].to_radians().cos();
+        for (set, robot) in lacking(seed, 2, 0.1, 1) {
+            assert_eq!(found(&set, &robot), None, "{seed}");
         }
-        assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}");
-        world.rows.sort_by(|a, b| a.at.joints_deg[1].total_cmp(&b.at.joints_deg[1]));
-        assert_eq!(found(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
+        for (set, robot) in lacking(seed, 4, 0.2, 4) {
+            assert_eq!(tools::find(&set, &robot), None, "{seed}");
+        }
     }
 }
 
@@ -164,28 +175,10 @@ fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
             let mut moved = same.clone();
             let step = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
             let half = moved.poses.len() / 2;
-            for pose in &mut moved.poses[half..] {
-                let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
-                *point_mm = step * *point_mm;
-            }
+            move_from(&mut moved, half, step);
             let told = tools::find(&moved, &robot);
             assert!(told.is_none_or(|told| told.is_placed), "seed {seed}, files {files}, camera moved");
         }
-    }
-}
-
-#[test]
-fn what_a_model_lacks_moves_no_tool() {
-    for seed in 0..8 {
-        let mut world = planned(160, 0, 25.0, 0.02, seed, &|_| {});
-        world.rows.retain(|row| row.at.role != Role::Center);
-        for row in &mut world.rows {
-            row.at.joints_deg[1] += 0.1 * (2.0 * row.at.joints_deg[1].to_radians()).sin();
-            row.at.joints_deg[4] += 0.2 * row.at.joints_deg[4].to_radians().cos();
-        }
-        assert_eq!(tools::find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}");
-        world.rows.sort_by(|a, b| a.at.joints_deg[4].total_cmp(&b.at.joints_deg[4]));
-        assert_eq!(tools::find(&Dataset::new(&world.rows).unwrap(), &world.nominal), None, "{seed}, in order");
     }
 }
 
@@ -194,16 +187,12 @@ fn rows_that_were_misread_are_no_other_tool_and_no_other_robot() {
     for (seed, by_mm) in [(0, 10.0), (1, 10.0), (2, 1e3), (3, 1e3), (4, 1e7), (5, 1e7)] {
         let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
         for row in [9, 47] {
-            if let Reading::Position { point_mm, .. } = &mut set.poses[row].reading {
-                point_mm.y += by_mm;
-            }
+            point_of(&mut set.poses[row]).y += by_mm;
             assert_eq!((tools::find(&set, &robot), found(&set, &robot)), (None, None), "{by_mm} mm, {row}");
         }
         // Beside them a tool that moved is found all the same.
         let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 20.0, seed + 50)], false);
-        if let Reading::Position { point_mm, .. } = &mut set.poses[9].reading {
-            point_mm.y += by_mm;
-        }
+        point_of(&mut set.poses[9]).y += by_mm;
         let told = tools::find(&set, &robot).expect("a tool").finding.finding;
         assert!(told.contains("the tool moved on the flange by 30."), "{by_mm}: {told}");
     }
@@ -229,10 +218,7 @@ fn sessions_that_a_tool_explains_better_are_not_said_to_be_the_sensors() {
         let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
         let step = transform(1e-3 * by * Vector3::new(1.0, 0.7, -0.5), by * Vector3::new(1.0, -0.5, 0.7));
         let half = set.poses.len() / 2;
-        for pose in &mut set.poses[half..] {
-            let Reading::Position { point_mm, .. } = &mut pose.reading else { continue };
-            *point_mm = step * *point_mm;
-        }
+        move_from(&mut set, half, step);
         let said = of_sessions(&set, &robot);
         assert!(said.as_ref().is_none_or(|(_, said)| said.is_none()), "{by} mm, seed {seed}: {said:?}");
         assert!(by < 10.0 || said.is_some(), "{by} mm, seed {seed}");

@@ -8,10 +8,9 @@
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::fit::{Left, PLACEMENT, Points, TARGET};
-use super::{BEATS, CHANCE, GRID, MUCH_LARGER, ROWS, SHORTEST, Table, UNTOLD, are_alike, named};
+use super::{BEATS, CHANCE, GRID, MUCH_LARGER, ROWS, SHORTEST, Table, UNTOLD, are_alike, by_chance, named};
 use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
@@ -30,6 +29,13 @@ struct Tools {
     off_mm: Vec<Vector3<f64>>,
     /// Of all rows of the table, gross errors without.
     weights: Vec<f64>,
+}
+
+impl Tools {
+    /// Whether a sensor that was moved explains the rows as well.
+    fn is_placed(&self) -> bool {
+        self.placed.scatter_mm() < BEATS * self.apart.scatter_mm()
+    }
 }
 
 /// Steps of a joint's zero by which its best value is found.
@@ -172,15 +178,7 @@ impl Table {
         // How the joint is counted is how its zero is.
         Some((left(off), self.points.robot.joints[joint].sign * off))
     }
-}
 
-impl Tools {
-    fn is_placed(&self) -> bool {
-        self.placed.scatter_mm() < BEATS * self.apart.scatter_mm()
-    }
-}
-
-impl Table {
     /// The two stretches of rows that are of different tools.
     fn tools_of_stretches(&self) -> Option<Tools> {
         let count = self.rows.len();
@@ -214,15 +212,12 @@ impl Table {
     /// These parts where they are of different tools; `tried` is the number of such cuts that were looked at.
     fn tools(&self, parts: Vec<Vec<usize>>, tried: usize) -> Option<Tools> {
         let tools = self.with_tools(&parts)?;
-        let further = tools.apart.taken - tools.together.taken;
-        let gain =
-            ((tools.together.squares - tools.apart.squares) / further) / (tools.apart.squares / tools.apart.freedom());
-        let fisher = FisherSnedecor::new(further.max(1.0), tools.apart.freedom()).ok()?;
+        let chance = by_chance(&tools.apart, &tools.together)?;
         let apart_mm = tools.apart.scatter_mm();
         let is_larger = tools.together.scatter_mm() > (MUCH_LARGER * apart_mm).max(REPEATABILITY_MM);
         let is_sensor = BEATS * tools.placed.scatter_mm() < apart_mm;
         // What no built robot is off by no tool explains.
-        if !is_larger || is_sensor || apart_mm > IMPLAUSIBLE_MM || fisher.sf(gain.max(0.0)) * tried as f64 > CHANCE {
+        if !is_larger || is_sensor || apart_mm > IMPLAUSIBLE_MM || chance * tried as f64 > CHANCE {
             return None;
         }
         let share = |tools: &Tools| tools.apart.scatter_mm() / tools.together.scatter_mm();
@@ -246,7 +241,8 @@ impl Table {
         }
         let of_tools = Points { tools: of_row, ..self.points.clone() };
         let (rough, _) = of_tools.with_tools(all.clone(), &vec![1.0; self.rows.len()]);
-        let weights = rough.weights(&all, self.rows.len());
+        let mut weights = vec![1.0; self.rows.len()];
+        rough.leave_out_gross(&all, &mut weights);
         let (apart, off_mm) = of_tools.with_tools(all.clone(), &weights);
         let whole = std::slice::from_ref(&all);
         let placed = Points { groups, ..self.points.clone() }.together(whole, &weights);

@@ -1,3 +1,5 @@
+use nalgebra::{Point3, Vector3};
+
 use super::*;
 use crate::identify::synthetic;
 use crate::measurements::{Measurement, Observed};
@@ -5,21 +7,16 @@ use crate::measurements::{Measurement, Observed};
 /// Wire lengths to an anchor that moves by 5 mm after `moved` rows.
 fn wire(moved: usize) -> (synthetic::World, Vec<Measurement>) {
     let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
-    let rows: Vec<Measurement> = world
-        .rows
-        .iter()
-        .filter(|r| r.at.role != Role::Center)
-        .enumerate()
-        .map(|(i, row)| {
-            let anchor = nalgebra::Point3::new(600.0, if i < moved { 300.0 } else { 305.0 }, 0.0);
-            // A ripple of 0.05 mm stands for noise.
-            let distance_mm =
-                (world.truth.target_mm(&row.at.joints_rad()) - anchor).norm() + 0.05 * (1.7 * i as f64).sin();
-            let mut at = row.at.clone();
-            at.group = "wire".into();
-            Measurement { at, target: String::new(), observed: Observed::Distance { distance_mm, sigma_mm: None } }
-        })
-        .collect();
+    let mut rows = world.rows.clone();
+    rows.retain(|row| row.at.role != Role::Center);
+    for (i, row) in rows.iter_mut().enumerate() {
+        let anchor = Point3::new(600.0, if i < moved { 300.0 } else { 305.0 }, 0.0);
+        // A ripple of 0.05 mm stands for noise.
+        let ripple_mm = 0.05 * (1.7 * i as f64).sin();
+        let distance_mm = (world.truth.target_mm(&row.at.joints_rad()) - anchor).norm() + ripple_mm;
+        row.at.group = "wire".into();
+        row.observed = Observed::Distance { distance_mm, sigma_mm: None };
+    }
     (world, rows)
 }
 
@@ -62,24 +59,14 @@ fn an_anchor_that_stayed_is_one_session() {
 /// Distances to the first pose, and everything but it moved by so much: evenly along the rows, or at once after 40 of them.
 fn to_center(moved_mm: f64, evenly: bool) -> (synthetic::World, Dataset) {
     let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
-    let mut rows: Vec<Measurement> = world
-        .rows
-        .iter()
-        .enumerate()
-        .filter(|(i, r)| *i == 0 || r.at.role != Role::Center)
-        .map(|(_, r)| r.clone())
-        .collect();
-    let from = world.truth.target_mm(&rows[0].at.joints_rad());
-    let count = rows.len() as f64;
-    for (i, row) in rows.iter_mut().enumerate() {
+    // The first row and those that are no centres.
+    let count = (world.rows.len() - 3) as f64;
+    let set = synthetic::to_first(&world, |i, place, from| {
         let share = if evenly { i as f64 / count } else { f64::from(u8::from(i > 40)) };
-        let place = world.truth.target_mm(&row.at.joints_rad()) + moved_mm * share * nalgebra::Vector3::y();
+        let place = place + moved_mm * share * Vector3::y();
         // A ripple of 0.02 mm stands for noise, 0.3 mm for a zero that is off.
-        let distance_mm = if i == 0 { 0.0 } else { (place - from).norm() + 0.02 * (1.7 * i as f64).sin() + 0.3 };
-        row.at.group = "one".into();
-        row.observed = Observed::Distance { distance_mm, sigma_mm: None };
-    }
-    let set = Dataset::new(&rows).unwrap();
+        if i == 0 { 0.0 } else { (place - from).norm() + 0.02 * (1.7 * i as f64).sin() + 0.3 }
+    });
     (world, set)
 }
 

@@ -1,5 +1,4 @@
 use super::*;
-use crate::identify::judge::held_out::{clearly_less, root_mean};
 use crate::linear_algebra::product;
 
 fn held_out(squares: &[f64]) -> HeldOut {

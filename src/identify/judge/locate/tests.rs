@@ -13,11 +13,7 @@ fn rows(count: usize, noise_mm: f64, oriented: bool, seed: u64) -> (Robot, Vec<M
         let mut random = rand_pcg::Pcg64Mcg::new(u128::from(seed) + 77);
         synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut random);
     }
-    for row in &mut world.rows {
-        if let Observed::Position { covariance_mm2, .. } = &mut row.observed {
-            *covariance_mm2 = Some(Matrix3::identity() * noise_mm * noise_mm);
-        }
-    }
+    synthetic::state(&mut world.rows, |_| Some(Matrix3::identity() * noise_mm * noise_mm));
     (world.truth, world.rows)
 }
 

@@ -6,11 +6,10 @@ use super::found::Before;
 use super::suspects::Suspect;
 use crate::difference::Difference;
 use crate::geometry::{Transform, fitted_frame, rotation_matrix};
-use crate::identify::data::dataset::{Dataset, Pose, Reading};
+use crate::identify::data::dataset::{Dataset, Pose};
 use crate::identify::judge::locate::Trust;
-use crate::identify::residuals::raw::Raw;
 use crate::identify::residuals::rows::{RowSpec, Rows};
-use crate::identify::sensor::{Extra, Scatter};
+use crate::identify::sensor::{Extra, Raw, Scatter};
 use crate::identify::settings::Model;
 use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{product, pseudo_inverse};
@@ -75,16 +74,12 @@ pub(super) fn rows(
     trust: Trust,
 ) -> Rows {
     let mut set = set.clone();
-    let point = |reading: &Reading| match reading {
-        Reading::Position { point_mm, .. } => point_mm.coords,
-        _ => Vector3::zeros(),
-    };
     let places = places(&set, robot);
     let more = places.first().map_or(0, Matrix3xX::ncols);
     // A thousandth of scale.
     let columns = |(pose, places): (&Pose, &Matrix3xX<f64>)| {
         let mut columns = places.clone().insert_column(0, 0.0);
-        columns.set_column(0, &(-1e-3 * point(&pose.reading)));
+        columns.set_column(0, &(-1e-3 * pose.reading.point_mm().unwrap_or_default().coords));
         columns
     };
     set.shared = set.poses.iter().zip(&places).map(columns).collect();
@@ -115,12 +110,9 @@ fn places(set: &Dataset, robot: &Robot) -> Vec<Matrix3xX<f64>> {
         }
     }
     let flange = |pose: &Pose| robot.base_from_flange(&pose.joints_rad);
-    let pair = |pose: &Pose| match &pose.reading {
-        Reading::Position { point_mm, .. } => {
-            let target = robot.tool_mm + pose.on_body_mm.unwrap_or_default();
-            Some((flange(pose) * Point3::from(target), *point_mm, 1.0))
-        }
-        _ => None,
+    let pair = |pose: &Pose| {
+        let target = robot.tool_mm + pose.on_body_mm.unwrap_or_default();
+        Some((flange(pose) * Point3::from(target), pose.reading.point_mm()?, 1.0))
     };
     let frame = |group: usize| fitted_frame(set.poses.iter().filter(|pose| pose.group == group).filter_map(pair));
     let frames: Vec<Transform> = (0..set.groups.len()).map(frame).collect();

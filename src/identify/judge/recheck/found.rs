@@ -12,7 +12,6 @@ pub(super) const FALSE_ALARM: f64 = 0.01;
 /// The robot as it was.
 #[derive(Debug, Clone)]
 pub struct Before {
-    /// Identified parameters.
     pub parameters: Vec<Parameter>,
     /// Their covariance, mm and mrad.
     pub covariance: DMatrix<f64>,
@@ -66,9 +65,7 @@ pub struct Recheck {
     pub poses: Vec<String>,
     /// Poses that fit far worse than the rest and were left out.
     pub strays: Vec<String>,
-    /// Every cause.
     pub causes: Vec<CauseSeen>,
-    /// Whether the robot changed.
     pub changed: bool,
     /// What explains it, the likeliest first, as words for files and for people; empty where nothing single does.
     pub likeliest: Vec<(String, String)>,

@@ -7,7 +7,6 @@
 //! ([`crate::difference`]), all looks together at one level. Where the robot did not change, each placement is compared with the old one.
 //! Rows that fit far worse than the rest are named and left out. Goes wrong: what a placement takes up (the first joint's zero) is only seen as a sensor that moved; two joints at once are a cause unknown.
 
-mod compare;
 mod compared;
 mod comparison;
 mod found;
@@ -18,6 +17,24 @@ mod suspects;
 #[cfg(test)]
 mod tests;
 
-pub use compare::recheck;
 pub use comparison::Stood;
 pub use found::{Before, CauseSeen, Moved, Recheck};
+
+use self::comparison::Comparison;
+use self::suspects::zero;
+use crate::identify::Error;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::locate::FEWEST_POSES;
+use crate::robot::{Parameter, Robot};
+
+/// Compares. A few rows that fit far worse than the rest are named and left out where the rest is then of one piece.
+pub fn recheck(set: &Dataset, robot: &Robot, before: &Before, stood: Stood) -> Result<Recheck, Error> {
+    let used = set.placing_rows(FEWEST_POSES)?;
+    let mut parameters = before.parameters.clone();
+    let others = (0..robot.joints.len()).map(zero(robot)).chain((0..3).map(Parameter::V));
+    parameters.extend(others.filter(|p| !before.parameters.contains(p)));
+    let oriented = set.has_rotations() && before.trust.rotation_rad.is_some();
+    let comparison = Comparison { set, robot, before, stood, parameters, oriented };
+    let whole = comparison.said(&used)?;
+    Ok(strays::left_out(&comparison, &used, &whole).unwrap_or(whole.recheck))
+}

@@ -12,16 +12,13 @@ use crate::identify::residuals::eliminate::{Block, Linear, Unknowns};
 use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::linear_algebra::{product, pseudo_inverse, without};
 
-/// How far offsets move the target at each pose in mm, after the placement was found anew.
-pub(super) struct Moves {
-    columns: DMatrix<f64>,
-}
+/// How far offsets move the target at each pose of each placement in mm, after that was found anew.
+pub(super) struct Moves(Vec<DMatrix<f64>>);
 
 impl Moves {
     pub(super) fn new(linear: &Linearised, count: usize) -> Moves {
         let robot = count - 1;
-        let mut parts = Vec::new();
-        for placement in &linear.placements {
+        let of_placement = |placement: &Placement| {
             let mut of_group: Vec<usize> = placement.poses.iter().flatten().copied().collect();
             of_group.dedup();
             let mut columns = DMatrix::zeros(3 * of_group.len(), count);
@@ -32,25 +29,21 @@ impl Moves {
                 columns.view_mut((3 * k, robot), (3, 1)).copy_from(&(1e-3 * place.point_mm.coords));
                 rigid.view_mut((3 * k, 0), (3, 6)).copy_from(&rigid_columns(&place.point_mm.coords));
             }
-            parts.push(without(&columns, &rigid));
-        }
-        let rows = parts.iter().map(|p| p.nrows()).sum();
-        let mut columns = DMatrix::zeros(rows, count);
-        let mut row = 0;
-        for part in parts {
-            columns.rows_mut(row, part.nrows()).copy_from(&part);
-            row += part.nrows();
-        }
-        Moves { columns }
+            without(&columns, &rigid)
+        };
+        Moves(linear.placements.iter().map(of_placement).collect())
     }
 
     /// The largest of all poses, mm.
     pub(super) fn most_mm(&self, columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
-        let mut moved = DVector::zeros(self.columns.nrows());
-        for ((at, unit), amount) in columns.iter().zip(amounts) {
-            moved += self.columns.column(*at) * (unit * amount);
-        }
-        (0..moved.len() / 3).map(|k| moved.rows(3 * k, 3).norm()).fold(0.0, f64::max)
+        let of_placement = |moves: &DMatrix<f64>| {
+            let mut moved = DVector::zeros(moves.nrows());
+            for ((at, unit), amount) in columns.iter().zip(amounts) {
+                moved += moves.column(*at) * (unit * amount);
+            }
+            (0..moved.len() / 3).map(|k| moved.rows(3 * k, 3).norm()).fold(0.0, f64::max)
+        };
+        self.0.iter().map(of_placement).fold(0.0, f64::max)
     }
 }
 

@@ -11,6 +11,10 @@ pub(super) struct Suspect {
     pub(super) columns: Vec<(usize, f64)>,
 }
 
+fn suspect(word: &str, words: &str, unit: &'static str, columns: Vec<(usize, f64)>) -> Suspect {
+    Suspect { word: word.to_owned(), words: words.to_owned(), unit, columns }
+}
+
 /// The zero of a joint.
 pub(super) fn zero(robot: &Robot) -> impl Fn(usize) -> Parameter + '_ {
     |joint| if robot.joints[joint].slides { Parameter::D(joint) } else { Parameter::Theta(joint) }
@@ -22,32 +26,17 @@ pub(super) fn suspects(robot: &Robot, parameters: &[Parameter]) -> Vec<Suspect> 
     let of_joint = |joint: usize| {
         let parameter = zero(robot)(joint);
         let (unit, factor) = parameter.file_unit();
-        let words = format!("the zero of joint {}", joint + 1);
-        Suspect { word: format!("joint-{}", joint + 1), words, unit, columns: vec![(at(parameter), 1.0 / factor)] }
+        let (word, words) = (format!("joint-{}", joint + 1), format!("the zero of joint {}", joint + 1));
+        suspect(&word, &words, unit, vec![(at(parameter), 1.0 / factor)])
     };
     let tool = |axis: usize| (at(Parameter::V(axis)), 1.0);
     let of_tool = |axis: usize| {
         let name = ["x", "y", "z"][axis];
-        Suspect {
-            word: format!("tool-{name}"),
-            words: format!("the tool along {name}"),
-            unit: "mm",
-            columns: vec![tool(axis)],
-        }
+        suspect(&format!("tool-{name}"), &format!("the tool along {name}"), "mm", vec![tool(axis)])
     };
-    let scale = Suspect {
-        word: "scale".to_owned(),
-        words: "the scale of the readings".to_owned(),
-        unit: "per mille",
-        // Its offset takes off what the readings have too much.
-        columns: vec![(parameters.len(), -1.0)],
-    };
-    let whole = Suspect {
-        word: "tool".to_owned(),
-        words: "the tool".to_owned(),
-        unit: "mm",
-        columns: (0..3).map(tool).collect(),
-    };
+    // Its offset takes off what the readings have too much.
+    let scale = suspect("scale", "the scale of the readings", "per mille", vec![(parameters.len(), -1.0)]);
+    let whole = suspect("tool", "the tool", "mm", (0..3).map(tool).collect());
     (0..robot.joints.len()).map(of_joint).chain((0..3).map(of_tool)).chain([scale, whole]).collect()
 }
 

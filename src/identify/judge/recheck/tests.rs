@@ -3,14 +3,12 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::locate::Trust;
 use crate::identify::judge::placement::Uncertain;
 use crate::identify::run::identify;
-use crate::identify::settings::{Extensions, Method, Settings};
+use crate::identify::settings::{Extensions, Settings};
 use crate::identify::synthetic;
 use crate::measurements::Measurement;
-use crate::robot::{Parameter, Robot};
 
 const NOISE_MM: f64 = 0.03;
 const NOISE_RAD: f64 = 2e-4;
@@ -34,10 +32,9 @@ fn cell(oriented: bool, seed: u64) -> Cell {
         synthetic::orient(&mut world.rows, &world.truth, NOISE_RAD, &mut Pcg64Mcg::seed_from_u64(3000 + seed));
     }
     let set = Dataset::new(&world.rows).unwrap();
-    let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let settings = Settings { extensions: Extensions::None, ..synthetic::settings() };
     let identified = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
-    let candidate = &identified.candidates[identified.chosen];
-    let (formulation, _) = candidate.found.as_ref().unwrap();
+    let formulation = identified.formulation().unwrap();
     let scatter = formulation.rows.scatter;
     let before = Before {
         correction: Vec::new(),
@@ -47,25 +44,14 @@ fn cell(oriented: bool, seed: u64) -> Cell {
         poses: set.poses.len(),
         p95_mm: 0.1,
     };
-    Cell { truth: world.truth, found: candidate.robot.clone(), before }
+    Cell { truth: world.truth, found: identified.robot().clone(), before }
 }
 
 impl Cell {
     /// Ten poses of one group of the true robot as it has become.
     fn check(&self, fault: &dyn Fn(&mut Robot), scale: f64, seed: u64) -> Recheck {
-        self.check_beside(fault, scale, seed, &|_| None)
-    }
-
-    fn check_beside(
-        &self,
-        fault: &dyn Fn(&mut Robot),
-        scale: f64,
-        seed: u64,
-        stood: &dyn Fn(&str) -> Option<Uncertain>,
-    ) -> Recheck {
-        let mut rows = self.rows(fault, 10, seed);
-        rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
-        recheck(&Dataset::new(&rows).unwrap(), &self.found, &self.before, stood).unwrap()
+        let scaled = |rows: &mut [Measurement]| rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
+        self.spoilt(fault, 10, seed, &scaled)
     }
 
     /// So many rows of one group, and what is said of them once they were spoilt.
@@ -160,7 +146,8 @@ fn cameras_that_stand_elsewhere_are_said_while_the_robot_is_the_same() {
         let mut transform = synthetic::sensor(2) * first(&cell.truth) * first(&cell.found).inverse();
         transform.translation.vector.x += shift_mm;
         let stood = Uncertain { transform, covariance: nalgebra::Matrix6::identity() * 1e-9 };
-        let found = cell.check_beside(&|_| {}, 1.0, seed, &|_| Some(stood.clone()));
+        let set = Dataset::new(&cell.rows(&|_| {}, 10, seed)).unwrap();
+        let found = recheck(&set, &cell.found, &cell.before, &|_| Some(stood.clone())).unwrap();
         assert!(!found.changed, "{}", found.statement());
         match shift_mm > 0.0 {
             true => {

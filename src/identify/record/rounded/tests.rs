@@ -1,8 +1,6 @@
 use nalgebra::Point3;
 
 use super::*;
-use crate::identify::run::identify;
-use crate::identify::settings::{Method, Settings};
 use crate::identify::synthetic::{World, planned, point};
 
 /// Rows of one group, as a display with these steps shows them.
@@ -18,9 +16,8 @@ fn shown(noise_mm: f64, seed: u64, [joints_deg, points_mm]: [f64; 2]) -> World {
 }
 
 fn said(world: &World) -> Option<String> {
-    let set = Dataset::new(&world.rows).unwrap();
-    let settings = Settings { method: Some(Method::TrustRegion), ..Settings::default() };
-    as_closely_as_digits(&set, &identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap())
+    let (set, found) = world.identified(&world.rows);
+    as_closely_as_digits(&set, &found)
 }
 
 #[test]

@@ -7,7 +7,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::data::shared::suppose_scale;
 use crate::identify::judge::placement::{Placed, Uncertain, is_held};
 use crate::identify::run::identify;
-use crate::identify::settings::{Extensions, Method, Model, Settings};
+use crate::identify::settings::{Extensions, Model, Settings};
 use crate::identify::synthetic::{self, World};
 use crate::measurements::{Observed, Role};
 use crate::robot::{Parameter, Robot};
@@ -74,7 +74,7 @@ impl Tally {
     fn add(&mut self, world: &World, fresh: &World, placed: &Placed) {
         for index in 0..placed.groups.len() {
             let group = placed.groups[index].0;
-            let (sensor, target) = truth(world, placed.robot(), group);
+            let (sensor, target) = truth(world, &placed.robot, group);
             let of_sensor = placed.sensor_from_base(index);
             for (uncertain, truth) in [(of_sensor.clone(), sensor), (of_sensor.inverse(), sensor.inverse())] {
                 let off = error(&uncertain, &truth);
@@ -107,7 +107,7 @@ impl Tally {
 }
 
 fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) -> Tally {
-    let settings = Settings { method: Some(Method::TrustRegion), extensions, ..Settings::default() };
+    let settings = Settings { extensions, ..synthetic::settings() };
     let mut tally = Tally::default();
     for seed in 0..robots {
         let (world, fresh) = (world(samples, 0, oriented, seed), world(24, 0, false, 500 + seed));
@@ -140,13 +140,13 @@ fn stated_uncertainties_are_those_of_simulated_robots() {
 fn what_is_held_is_what_a_placement_stands_for() {
     let world = world(40, 0, true, 1);
     let set = Dataset::new(&world.rows).unwrap();
-    let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let settings = Settings { extensions: Extensions::None, ..synthetic::settings() };
     let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
     let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
     for parameter in world.nominal.mdh_parameters() {
         // Of what moves the target on the flange the last joint takes the share that its tolerance has beside the target's.
         let held = is_held(parameter, usize::MAX);
-        let off = (placed.robot().value(parameter) - world.nominal.value(parameter)).abs();
+        let off = (placed.robot.value(parameter) - world.nominal.value(parameter)).abs();
         assert!(!held || off < 1e-9, "{} moved by {off}", parameter.name());
     }
 }
@@ -155,7 +155,7 @@ fn what_is_held_is_what_a_placement_stands_for() {
 fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
     let world = world(40, 0, false, 2);
     let set = Dataset::new(&world.rows).unwrap();
-    let plain = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let plain = Settings { extensions: Extensions::None, ..synthetic::settings() };
     let by_distance = Settings { model: Some(Model::CenterDistance), ..plain.clone() };
     let mut nominal = identify(&set, &world.nominal, &plain, 1, &|_| {}).unwrap();
     nominal.keep_nominal(&world.nominal, Model::Position, None);
@@ -164,8 +164,8 @@ fn a_robot_found_by_distances_and_a_nominal_one_are_placed_too() {
     {
         let placed = found.placed(&set, &world.nominal, settings).unwrap().unwrap();
         assert_eq!(placed.groups.len(), 4);
-        let is_nominal = found.candidates[found.chosen].found.is_none();
-        let (sensor, _) = truth(&world, placed.robot(), placed.groups[0].0);
+        let is_nominal = found.formulation().is_none();
+        let (sensor, _) = truth(&world, &placed.robot, placed.groups[0].0);
         let off = error(&placed.sensor_from_base(0), &sensor);
         let bound = if is_nominal { 5.0 } else { 1.0 };
         assert!(off.fixed_rows::<3>(3).norm() < bound, "{is_nominal} {off}");
