@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::judge::{Basis, Way};
 use super::layout::{ONE_POINT, are_readings, is_kept};
 use super::part::{At, Kind, Part};
-use super::pick::listed;
+use super::pick::{self, listed};
 use super::rows::{Measurement, from_table, reading_name};
 use crate::csv_table::Table;
 use crate::files::Result;
@@ -117,8 +117,8 @@ impl Taken<'_> {
                 cells.extend((several && !own.contains_key("target")).then(|| (*target).to_owned()));
                 for (at, joint) in picked.joints.iter().zip(&self.robot.joints) {
                     let value = self.parts[at.part].number(row, at.column)?;
-                    let unit = if joint.slides { self.way.lengths } else { self.way.joints };
-                    cells.push(unit.converted(value).to_string());
+                    let reading = pick::reading(self.parts, at, joint, value, self.way.joints, self.way.lengths);
+                    cells.push(reading.to_string());
                 }
                 let mut numbers = Vec::new();
                 for at in columns {

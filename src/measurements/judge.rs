@@ -12,7 +12,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::layout::point;
 use super::part::{At, Part};
-use super::pick::Picked;
+use super::pick::{self, Picked};
 use crate::robot::tool_fit::{Start, middle_spread};
 use crate::robot::{Joint, Robot};
 use crate::tables::names::{Unit, What};
@@ -80,7 +80,8 @@ impl Way {
         for &row in rows {
             let reading = |(at, joint): (&At, &Joint)| {
                 let value = parts[at.part].optional(row, at.column).ok().flatten()?;
-                Some(if joint.slides { lengths.converted(value) } else { joints.converted(value).to_radians() })
+                let reading = pick::reading(parts, at, joint, value, *joints, *lengths);
+                Some(if joint.slides { reading } else { reading.to_radians() })
             };
             let angles: Option<Vec<f64>> = picked.joints.iter().zip(&robot.joints).map(reading).collect();
             if let (Some(angles), Some(point)) = (angles, point(parts, row, at)) {

@@ -6,6 +6,7 @@
 
 use super::part::{At, Part};
 use crate::files::{Error, Result};
+use crate::robot::{Joint, Robot};
 use crate::tables::names::{Name, Unit, What, is_index};
 
 /// Columns, taken so far.
@@ -48,6 +49,30 @@ impl Picked {
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()
     }
+}
+
+/// A joint's reading in deg, or in mm where it slides: in the unit that its column states, else in these.
+pub(super) fn reading(parts: &[Part], at: &At, joint: &Joint, value: f64, angles: Unit, lengths: Unit) -> f64 {
+    let stated = unit(parts, at).filter(|u| !u.is_angle());
+    if joint.slides { stated.unwrap_or(lengths).converted(value) } else { angles.converted(value) }
+}
+
+/// Columns of lengths are no joints that turn.
+pub(super) fn check_lengths(parts: &[Part], picked: &Picked, robot: &Robot) -> Result<()> {
+    for (number, (at, joint)) in picked.joints.iter().zip(&robot.joints).enumerate() {
+        if let Some(length) = unit(parts, at).filter(|u| !u.is_angle() && !joint.slides) {
+            let message = format!(
+                "{} is in {}, but joint {} of the robot turns",
+                listed(parts, &[*at]),
+                length.word(),
+                number + 1
+            );
+            let hint =
+                "a joint that slides has `type = \"prismatic\"` in the robot's file; else name the column's unit";
+            return Err(parts[at.part].refuse(message, Some(hint)));
+        }
+    }
+    Ok(())
 }
 
 /// The unit that a column states.
@@ -109,7 +134,9 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
         let units: Vec<Unit> = columns.iter().filter_map(unit).collect();
         units.windows(2).any(|two| two[0] != two[1]).then_some(columns)
     };
-    match mixed(picked.joints.clone()).or_else(|| mixed(measured.copied().collect())) {
+    // A joint that slides has a unit of its own.
+    let angles = picked.joints.iter().copied().filter(|at| unit(at).is_none_or(Unit::is_angle)).collect();
+    match mixed(angles).or_else(|| mixed(measured.copied().collect())) {
         Some(columns) => {
             let message = format!("{} have different units", listed(parts, &columns));
             Err(parts[columns[0].part]

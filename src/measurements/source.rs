@@ -146,6 +146,7 @@ impl Source {
             let found = format!("{} of {} columns are numbers", parts[0].free().len(), parts[0].width());
             return Err(parts[0].refuse(format!("no columns of {count} joints: {found}"), Some(hint)));
         }
+        pick::check_lengths(&parts, &picked, robot)?;
         let unit = self.forced().joints.or(picked.joint_unit).or_else(|| judge::angle_by_size(&parts, &picked));
         let Some(unit) = unit else {
             let message =
@@ -159,7 +160,7 @@ impl Source {
             let (line, cells) = &parts[0].rows[row];
             let reading = |(at, joint): (&At, &crate::robot::Joint)| {
                 let value = parts[0].number(row, at.column)?;
-                Ok(if joint.slides { value } else { unit.converted(value) })
+                Ok(pick::reading(&parts, at, joint, value, unit, Unit::Mm))
             };
             let readings = picked.joints.iter().zip(&robot.joints).map(reading).collect::<Result<Vec<f64>>>()?;
             Ok((*line, name.map_or_else(|| (row + 1).to_string(), |column| cells[column].to_owned()), readings))
@@ -178,6 +179,7 @@ impl Source {
     fn way(&self, parts: &[Part], robot: &Robot, widened: bool) -> Result<(Way, Basis)> {
         let count = robot.joints.len();
         let picked = pick::by_names(parts, count)?;
+        pick::check_lengths(parts, &picked, robot)?;
         if let [(_, first), .., (_, second)] = &picked.points[..] {
             let readings = layout::are_readings(parts, &picked);
             // Two that are nearly one may be where the robot was sent and what was measured there.

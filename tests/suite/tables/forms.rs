@@ -189,3 +189,34 @@ fn what_is_far_off_is_said_of_the_sum_that_is_determined() {
     }
     assert!(!said(0.0).contains("far from nominal"), "{}", said(0.0));
 }
+
+/// A joint that slides has the unit of its own column, else that of the points; a column of lengths is no joint that turns.
+#[test]
+fn a_joint_that_slides_is_read_in_its_own_unit() {
+    let folder = Folder(workplace());
+    let (turning, _) = world(1);
+    let mut robot = turning.clone();
+    robot.joints[2].slides = true;
+    let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
+    let row = |i: usize| {
+        let joints: Vec<f64> = (0..6).map(|j| 70.0 * ((7 * i + 3 * j * j + 1) as f64).sin()).collect();
+        let reading = |(j, q): (usize, &f64)| if j == 2 { *q } else { q.to_radians() };
+        let readings: Vec<f64> = joints.iter().enumerate().map(reading).collect();
+        (joints, (sensor * robot.target_mm(&readings)).into())
+    };
+    let rows: Rows = (0..40).map(row).collect();
+    let forms = [("m", 1e-3, "mm", 1.0), ("cm", 0.1, "mm", 1.0), ("mm", 1.0, "m", 1e-3), ("m", 1e-3, "m", 1e-3)];
+    for (slide, times, length, of_point) in forms {
+        let header =
+            format!("q1 [deg],q2 [deg],q3 [{slide}],q4 [deg],q5 [deg],q6 [deg],x [{length}],y [{length}],z [{length}]");
+        let line = |q: &[f64], p: &[f64; 3]| {
+            let readings: Vec<f64> = q.iter().enumerate().map(|(j, v)| if j == 2 { v * times } else { *v }).collect();
+            joined(&readings, &p.map(|v| v * of_point))
+        };
+        let file = folder.file("slides.csv", text(&header, &rows, ",", line));
+        let (found, _) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{slide}: {}", report(&e)));
+        same(&found, &rows, slide);
+        let what = format!("column 3 is in {slide}, but joint 3 of the robot turns");
+        refused(&source(&[&file]), &turning, &[&what, "prismatic"]);
+    }
+}

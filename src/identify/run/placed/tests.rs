@@ -186,7 +186,7 @@ fn stated(world: &mut World, scale: f64) {
 /// Where noise is stated cameras have an unknown scale: what is uncertain of it is uncertain of the robot, and not of what they read.
 #[test]
 fn a_rigs_own_scale_is_not_expected_in_what_it_reads() {
-    let settings = Settings { method: Some(Method::TrustRegion), extensions: Extensions::None, ..Settings::default() };
+    let settings = Settings { extensions: Extensions::None, ..synthetic::settings() };
     for oriented in [false, true] {
         let mut ratios = Vec::new();
         for seed in 0..12 {
