@@ -54,13 +54,9 @@ fn other(bytes: &[u8], format: Option<ImageFormat>) -> Result<DynamicImage, Stri
     }
     // What the header announces is checked before anything of that size is allocated.
     reader.limits(Limits::no_limits());
-    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let decoder = reader.into_decoder().map_err(limits::undecodable)?;
     limits::check(image::ImageDecoder::dimensions(&decoder), image::ImageDecoder::total_bytes(&decoder))?;
-    DynamicImage::from_decoder(decoder).map_err(undecodable)
-}
-
-fn undecodable(e: image::ImageError) -> String {
-    format!("{UNDECODABLE}: {e}")
+    DynamicImage::from_decoder(decoder).map_err(limits::undecodable)
 }
 
 /// Decodes a JPEG by the letter: the decoder of the `image` crate, told not to fill in what is missing.

@@ -58,9 +58,18 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
     Ok(Header { width: size.0, height: size.1, file_bytes, decoded_bytes })
 }
 
+/// Why a decoder gave up, not in its own words, which are about its code.
+pub(super) fn undecodable(error: image::ImageError) -> String {
+    let why = match error {
+        image::ImageError::IoError(_) => "the file ends early",
+        image::ImageError::Unsupported(_) => "its format has kinds that are not read, and this is one",
+        _ => "damaged, or of another format than its name says",
+    };
+    format!("{UNDECODABLE}: {why}")
+}
+
 /// Width, height and bytes of the samples that an encoded picture announces.
 fn announced<R: Read + Seek + std::io::BufRead>(source: R, path: &Utf8Path) -> Result<((u32, u32), u64), String> {
-    let undecodable = |e: image::ImageError| format!("{UNDECODABLE}: {e}");
     let mut reader = ImageReader::new(source).with_guessed_format().map_err(|e| format!("cannot be read: {e}"))?;
     if reader.format().is_none()
         && let Ok(format) = ImageFormat::from_path(path)
