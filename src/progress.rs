@@ -38,7 +38,7 @@ enum Shown {
 }
 
 struct State {
-    length: u64,
+    length: AtomicU64,
     done: AtomicU64,
     label: Mutex<String>,
     start: Instant,
@@ -60,7 +60,12 @@ fn shown(label: &str, length: u64) -> Shown {
     }
     #[expect(clippy::disallowed_methods, reason = "only for the time left that is shown")]
     let start = Instant::now();
-    let state = Arc::new(State { length, done: AtomicU64::new(0), label: Mutex::new(label.to_owned()), start });
+    let state = Arc::new(State {
+        length: AtomicU64::new(length),
+        done: AtomicU64::new(0),
+        label: Mutex::new(label.to_owned()),
+        start,
+    });
     let (stop, stopped) = channel();
     let seen = Arc::clone(&state);
     let ticker = std::thread::Builder::new().spawn(move || {
@@ -91,14 +96,15 @@ impl State {
     fn line(&self) -> String {
         let label = self.label.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let (done, elapsed) = (self.done.load(Ordering::Relaxed), self.start.elapsed().as_secs_f64());
-        if self.length == 0 {
+        let length = self.length.load(Ordering::Relaxed);
+        if length == 0 {
             return format!("{label}: for {elapsed:.0} s now");
         }
         let left = match done {
             0 => String::new(),
-            _ => format!(", about {:.0} s left", elapsed * self.length.saturating_sub(done) as f64 / done as f64),
+            _ => format!(", about {:.0} s left", elapsed * length.saturating_sub(done) as f64 / done as f64),
         };
-        format!("{label}: {done} of {}{left}", self.length)
+        format!("{label}: {done} of {length}{left}")
     }
 }
 
@@ -110,6 +116,17 @@ impl Step {
             Shown::Bar(bar) => bar.inc(parts),
             Shown::Lines { state, .. } => {
                 state.done.fetch_add(parts, Ordering::Relaxed);
+            }
+        }
+    }
+
+    /// So many parts more than were thought of are to be done.
+    pub fn lengthen(&self, parts: u64) {
+        match &self.shown {
+            Shown::Nothing => {}
+            Shown::Bar(bar) => bar.inc_length(parts),
+            Shown::Lines { state, .. } => {
+                state.length.fetch_add(parts, Ordering::Relaxed);
             }
         }
     }
@@ -181,9 +198,10 @@ mod tests {
     #[expect(clippy::disallowed_methods, reason = "a start is needed")]
     fn a_line_names_step_count_and_time_left() {
         let start = Instant::now() - Duration::from_secs(10);
-        let state = State { length: 60, done: AtomicU64::new(12), label: Mutex::new("looking".to_owned()), start };
+        let length = AtomicU64::new(60);
+        let state = State { length, done: AtomicU64::new(12), label: Mutex::new("looking".to_owned()), start };
         assert_eq!(state.line(), "looking: 12 of 60, about 40 s left");
-        let state = State { length: 0, ..state };
+        let state = State { length: AtomicU64::new(0), ..state };
         assert_eq!(state.line(), "looking: for 10 s now");
     }
 }

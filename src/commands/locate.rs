@@ -37,7 +37,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let (robot, check) = robot::file::read_checked(&args.robot)?;
     let heeded = heed(check.as_ref(), &args.robot);
     replaced(&out).into_iter().for_each(progress::warn);
-    let file = measured(args, config, &run, &out)?;
+    let (file, of_measuring) = measured(args, config, &run, &out)?;
     let source = source(vec![file], &args.table, config);
     let rows = read(&source, &robot)?;
     check_joints(&robot, &rows, &source.files[0])?;
@@ -73,7 +73,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let summary = || report::located::summary(&content.placement, &content.fit, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
     let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
-    Ok(Outcome { stdout, status: status.or_worse(heeded) })
+    Ok(Outcome { stdout, status: status.or_worse(heeded).or_worse(of_measuring) })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.
@@ -86,11 +86,11 @@ fn replaced(out: &Utf8Path) -> Vec<String> {
     [(PLACEMENT, "placement.json"), ("measure.json", "measurements.csv")].into_iter().filter_map(by_other).collect()
 }
 
-/// The measurements: those of a folder of pictures are made first, as `measure` makes them.
-fn measured(args: &Locate, config: &Config, run: &Run, out: &Utf8Path) -> Result<Utf8PathBuf> {
+/// The measurements: those of a folder of pictures are made first, as `measure` makes them, with the status of that.
+fn measured(args: &Locate, config: &Config, run: &Run, out: &Utf8Path) -> Result<(Utf8PathBuf, Status)> {
     if !args.measure.poses.is_dir() {
-        return Ok(args.measure.poses.clone());
+        return Ok((args.measure.poses.clone(), Status::Done));
     }
-    measure::run(&args.measure, config, run.clone())?;
-    Ok(out.join("measurements.csv"))
+    let outcome = measure::run(&args.measure, config, run.clone())?;
+    Ok((out.join("measurements.csv"), outcome.status))
 }

@@ -4,6 +4,7 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
+use super::heed::heed_rig;
 use super::{Outcome, Result};
 use crate::cli::Rectify;
 use crate::config::Config;
@@ -33,7 +34,8 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let calibrated = calibration::read(&rig_file)?;
-    calibrated.doubts().into_iter().for_each(progress::warn);
+    let heeded = heed_rig(&calibrated);
+    let mut doubts = calibrated.doubts();
     let calibration::Calibrated { rig, board, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
@@ -82,10 +84,14 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
     let json = out.write_json("rectified.json", &file)?;
-    let page = report::rectify::page(&file, &rectified, shown.as_ref())?;
+    let rows = report::rectify::doubt(&file);
+    rows.iter().for_each(progress::warn);
+    let status = if rows.is_some() { Status::OutOfTolerance } else { Status::Done };
+    doubts.extend(rows);
+    let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status: status.or_worse(heeded) })
 }
 
 /// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture

@@ -133,6 +133,12 @@ impl Calibrated {
         });
         changed.into_iter().chain(failed).collect()
     }
+
+    /// Whether these words leave no length to rely on.
+    pub fn is_advised_against(&self) -> bool {
+        let is_trusted = |check: Check| check.verdict == Verdict::Pass || check.trusted_mm.is_some_and(f64::is_finite);
+        !self.unconfirmed.is_empty() || self.check.is_some_and(|check| !is_trusted(check))
+    }
 }
 
 /// `factor` times the covariance that the refinement gives a corner, plus the square of `added_px` on both axes.

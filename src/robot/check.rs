@@ -3,6 +3,8 @@
 use camino::Utf8Path;
 use serde::{Deserialize, Serialize};
 
+use crate::diagnostic::Status;
+
 /// What to do with the robot that was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -13,6 +15,16 @@ pub enum Advice {
     /// Nothing better than the nominal robot was found, and that is the result.
     KeepNominal,
     DoNotUse,
+}
+
+impl Advice {
+    /// What a command ends with that found or uses such a robot, at best.
+    pub fn status(self) -> Status {
+        match self {
+            Advice::Use | Advice::KeepNominal => Status::Done,
+            Advice::Check | Advice::DoNotUse => Status::OutOfTolerance,
+        }
+    }
 }
 
 /// The advice with its reason, as files carry it to whatever uses the robot.
