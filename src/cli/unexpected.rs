@@ -216,10 +216,15 @@ mod tests {
     use super::*;
     use crate::cli::Cli;
 
-    fn of(words: &[&str]) -> Option<String> {
+    fn answered(words: &[&str]) -> (String, Option<String>) {
         let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
         let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-        mended(&Cli::command(), &words, error).1
+        let (error, hint) = mended(&Cli::command(), &words, error);
+        (error.to_string(), hint)
+    }
+
+    fn of(words: &[&str]) -> Option<String> {
+        answered(words).1
     }
 
     #[test]
@@ -272,15 +277,10 @@ mod tests {
 
     #[test]
     fn usage_shows_what_a_command_takes_and_not_what_was_typed() {
-        let said = |words: &[&str]| {
-            let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
-            let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-            mended(&Cli::command(), &words, error).0.to_string()
-        };
         for words in
             [&["measure", "--poses", "x", "--square-mm", "10"][..], &["measure"], &["measure", "x", "--rig", "y"]]
         {
-            let said = said(words);
+            let said = answered(words).0;
             assert!(said.contains("Usage: stereocal measure [OPTIONS] <POSES> [RIGHT]"), "{said}");
             assert!(!said.contains("to pass"), "{said}");
         }
@@ -288,11 +288,6 @@ mod tests {
 
     #[test]
     fn tips_stay_where_they_are_a_slip_away() {
-        let said = |words: &[&str]| {
-            let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
-            let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-            mended(&Cli::command(), &words, error).0.to_string()
-        };
         for (typed, tip) in [
             (&["identfy"][..], Some("identify")),
             (&["identify", "--sed", "3"], Some("--seed")),
@@ -301,7 +296,7 @@ mod tests {
             (&["export", "calibration", "--format", "matlab"], None),
             (&["export", "calibration", "--format", "opncv"], Some("opencv")),
         ] {
-            let said = said(typed);
+            let said = answered(typed).0;
             assert_eq!(said.contains("tip:"), tip.is_some(), "{typed:?}: {said}");
             assert!(tip.is_none_or(|tip| said.contains(tip)), "{typed:?}: {said}");
         }

@@ -19,10 +19,17 @@ pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     if changed.is_some() { Status::OutOfTolerance } else { advised }
 }
 
-/// Warns of what a rig's own calibration says against it; with which status a command that uses it ends at best.
-pub fn heed_rig(rig: &Calibrated) -> Status {
-    rig.doubts().into_iter().for_each(progress::warn);
-    if rig.is_advised_against() { Status::OutOfTolerance } else { Status::Done }
+/// What is said against a rig, and with which status a command that uses it ends at best.
+pub struct Heeded {
+    pub doubts: Vec<String>,
+    pub status: Status,
+}
+
+/// Warns of what a rig's own calibration says against it.
+pub fn heed_rig(rig: &Calibrated) -> Heeded {
+    let doubts = rig.doubts();
+    doubts.iter().for_each(progress::warn);
+    Heeded { doubts, status: if rig.is_advised_against() { Status::OutOfTolerance } else { Status::Done } }
 }
 
 /// What the last check beside a result says against it, if it was of that very result.

@@ -39,7 +39,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
     let calibrated = calibration::read(&rig_file)?;
-    let status = heed_rig(&calibrated);
+    let status = heed_rig(&calibrated).status;
     let Calibrated { rig, noise, pair_excess, .. } = calibrated;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {

@@ -4,7 +4,7 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
-use super::heed::heed_rig;
+use super::heed::{Heeded, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Rectify;
 use crate::config::Config;
@@ -34,8 +34,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let calibrated = calibration::read(&rig_file)?;
-    let heeded = heed_rig(&calibrated);
-    let mut doubts = calibrated.doubts();
+    let Heeded { mut doubts, status: heeded } = heed_rig(&calibrated);
     let calibration::Calibrated { rig, board, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);

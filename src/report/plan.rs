@@ -121,11 +121,16 @@ fn curve(record: &PlanFile) -> Result<maud::Markup> {
     if let Some(paper) = &record.paper {
         plot = plot.line("as planned by Shi et al.", &line(paper));
     }
-    Ok(page::figure(
-        &plot.svg()?,
-        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise. Shi et al. visit points on \
-         the same spheres with one orientation of the flange.",
-    ))
+    let of_paper = match record.paper {
+        Some(_) => " Shi et al. visit points on the same spheres with one orientation of the flange.",
+        // The first few poses are planned without a comparison.
+        None if record.plan.expected.is_empty() => "",
+        None => " This robot does not reach the poses of Shi et al. before these cameras.",
+    };
+    let caption = format!(
+        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise.{of_paper}"
+    );
+    Ok(page::figure(&plot.svg()?, &caption))
 }
 
 /// Places of the spheres by thirds of the expected error.

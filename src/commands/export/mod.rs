@@ -26,7 +26,7 @@ fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Ou
     let named = args.calibration.clone().unwrap_or_else(|| out.or_usual(rig::OWN_NAME, &config.out));
     let rig_file = rig::file(Some(&named), &out)?;
     let calibrated = rig::read(&rig_file)?;
-    let status = heed_rig(&calibrated);
+    let status = heed_rig(&calibrated).status;
     let rig = calibrated.rig;
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&rig_file]);
     let files = match args.format {

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::heed::heed_rig;
+use super::heed::{Heeded, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Measure;
 use crate::config::Config;
-use crate::diagnostic::{Status, count};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -34,7 +34,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
-    let (known, status) = knowledge(args, config, &rig_file)?;
+    let (known, Heeded { doubts, status }) = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;
     if args.watch {
         let wanted = Wanted {
@@ -71,7 +71,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
         },
     );
     let json = json?;
-    let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances })?;
+    let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances, doubts })?;
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let page = if args.draw { report::page::with_overlays(page, names) } else { page };
     report::page::write(&out, "measure.html", page)?;
@@ -89,11 +89,11 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
     lists.find(|list| list.is_file()).unwrap_or(first)
 }
 
-/// The rig, the target and what is known of both; with which status the run ends at best.
-fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Knowledge, Status)> {
+/// The rig, the target and what is known of both; what is said against the rig.
+fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Knowledge, Heeded)> {
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let calibrated = calibration::read(rig_file)?;
-    let status = heed_rig(&calibrated);
+    let heeded = heed_rig(&calibrated);
     let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(
@@ -107,7 +107,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Kn
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
     let known = Knowledge { rig, noise, pair_excess, farthest_pair, volume, board, crossing_mm, tolerance_mm };
-    Ok((known, status))
+    Ok((known, heeded))
 }
 
 /// Every pose of the list with its corners, or why there are none.

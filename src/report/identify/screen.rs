@@ -65,7 +65,9 @@ fn next(advice: Advice, robot: &str, file: &str) -> String {
         Advice::KeepNominal => {
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
         }
-        Advice::DoNotUse => "mend what is named above, and identify again (`stereocal guide warnings`)".to_owned(),
+        Advice::DoNotUse => format!(
+            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the pendant"
+        ),
     }
 }
 
