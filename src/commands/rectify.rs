@@ -82,15 +82,20 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
+    let status = heeded.or_worse(rows(&file));
     let json = out.write_json("rectified.json", &file)?;
-    let rows = report::rectify::doubt(&file);
-    rows.iter().for_each(progress::warn);
-    let status = if rows.is_some() { Status::OutOfTolerance } else { Status::Done };
-    doubts.extend(rows);
+    doubts.extend(report::rectify::doubt(&file));
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
-    Ok(Outcome { stdout, status: status.or_worse(heeded) })
+    Ok(Outcome { stdout, status })
+}
+
+/// Says whether rows do not agree; with which status the run then ends at best.
+fn rows(file: &RectifiedFile) -> Status {
+    let doubt = report::rectify::doubt(file);
+    doubt.iter().for_each(progress::warn);
+    if doubt.is_some() { Status::OutOfTolerance } else { Status::Done }
 }
 
 /// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture

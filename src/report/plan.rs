@@ -22,8 +22,7 @@ pub fn summary(record: &PlanFile) -> String {
     for expected in &record.plan.expected {
         let same = |e: &&Expected| e.poses == expected.poses;
         let of = |e: &Expected| number(Some(e.rms_mm), 4);
-        let paper =
-            record.paper.iter().map(|paper| paper.expected.iter().find(same).map_or_else(|| "n/a".to_owned(), of));
+        let paper = record.paper.iter().map(|paper| paper.expected.iter().find(same).map_or_else(String::new, of));
         table.row([expected.poses.to_string(), of(expected)].into_iter().chain(paper));
     }
     let of = |d: &Determined| {

@@ -30,7 +30,8 @@ pub fn doubt(file: &RectifiedFile) -> Option<String> {
     let (common, residual) = (file.common?, file.residual?);
     (residual.rms_px > AGREE_PX).then(|| {
         format!(
-            "the {common} differ by {} px RMS, too much for dense stereo (up to {AGREE_PX}): the pictures are of another rig, it changed, or its              calibration is poor",
+            "the {common} differ by {} px RMS, too much for dense stereo (up to {AGREE_PX}): the pictures are of another rig, it changed, or its \
+             calibration is poor",
             number(Some(residual.rms_px), 2)
         )
     })

@@ -67,7 +67,8 @@ fn three_pairs_and_the_lenses_of_any_program_make_a_rig() {
             at,
             &["export", "calibration", "--format", format, "--calibration", "lens/calibration.json", "--out", format],
         );
-        assert_eq!(told.status.code(), Some(0), "{format}: {}", stderr(&told));
+        // A rig of five pairs has lenses, and no length to be trusted.
+        assert_eq!(told.status.code(), Some(1), "{format}: {}", stderr(&told));
     }
     let without = stereocal(at, &["camera-check", "--corners", "three.csv", "--out", "none"]);
     assert!(stderr(&without).contains("calibration needs 4"), "{}", stderr(&without));
@@ -284,7 +285,7 @@ fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
         ["camera-check", "mixed", "--intrinsics", "before/calibration.json", "--out", "mostly", "--tolerance-mm", "1"];
     let mostly = stereocal(at, &known);
     assert!(
-        stderr(&mostly).contains("calibrated from 1 of these pairs (of 5), which count twice"),
+        stderr(&mostly).contains("calibrated from 1 of these pairs (of 5), which count twice: the uncertainty that is stated is a little too small"),
         "{}",
         stderr(&mostly)
     );

@@ -45,10 +45,15 @@ fn warnings(judged: &Judged) -> Vec<String> {
     // Of what stands among the things to do only the reason is new.
     let next = summary::next(judged);
     let said = |warning: &Warning| match next.contains(&warning.text.as_str()) {
-        true => page::capital(&warning.reason),
+        true => warning.reason.clone(),
         false => warning.whole(),
     };
     judged.warnings.iter().filter(is_new).map(said).filter(|said| !said.is_empty()).collect()
+}
+
+/// What the terminal says of the page, said on it.
+fn on_this_page(said: &str) -> String {
+    said.replace(" in camera-check.html", " below")
 }
 
 /// The report, with pictures of some pairs.
@@ -58,7 +63,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         Verdict::Undecided => Tone::Doubtful,
         Verdict::Fail => Tone::Bad,
     };
-    let next: Vec<String> = summary::next(judged).into_iter().map(str::to_owned).collect();
+    let next: Vec<String> = summary::next(judged).into_iter().map(on_this_page).collect();
     let warnings = warnings(judged);
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
@@ -134,7 +139,7 @@ fn ledger(judged: &Judged) -> Markup {
     let next = summary::next(judged);
     let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&line.remedy) {
         true => line.detail.clone(),
-        false => format!("{}. To do: {}", line.detail, line.remedy),
+        false => format!("{}. To do: {}", line.detail, on_this_page(line.remedy)),
     };
     let below: Vec<&Evidence> = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).collect();
     html! {
