@@ -114,6 +114,10 @@ fn with_narrow_tables(text: &str) -> String {
     let mut narrow = String::with_capacity(text.len());
     let mut lines = text.split_inclusive('\n').peekable();
     while let Some(line) = lines.next() {
+        if line.starts_with("[picture: ") {
+            narrow += &wrapped(line.trim_end(), ["", ""]);
+            continue;
+        }
         if !line.starts_with('|') {
             narrow.push_str(line);
             continue;
