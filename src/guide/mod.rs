@@ -114,7 +114,7 @@ fn with_narrow_tables(text: &str) -> String {
     let mut narrow = String::with_capacity(text.len());
     let mut lines = text.split_inclusive('\n').peekable();
     while let Some(line) = lines.next() {
-        if line.starts_with("[picture: ") {
+        if line.starts_with("[picture: ") && line.chars().count() > COLUMNS {
             narrow += &wrapped(line.trim_end(), ["", ""]);
             continue;
         }
