@@ -181,7 +181,7 @@ const HINT: &str = "`stereocal init` writes one with every key and its meaning";
 /// A key that stands where there is none of its name: most likely its section's line is a comment still.
 fn of_section(error: files::Error) -> files::Error {
     match error {
-        files::Error::Format { message, place, hint: None } if message.contains("unknown field") => {
+        files::Error::Format { message, place, hint: None } if message.contains("unknown key") => {
             let hint = "a key belongs below the line of its section, as `squares` below `[check_board]`, and that line must not begin with `#`; \
                         `stereocal init --out new` writes every key where it belongs";
             files::Error::Format { message, place, hint: Some(hint.to_owned()) }

@@ -45,6 +45,10 @@ pub trait Explain: std::error::Error {
     fn hint(&self) -> Option<String> {
         None
     }
+    /// What a reader of the results folder must know.
+    fn note(&self) -> Option<String> {
+        None
+    }
 }
 
 /// The message as a person reads it on stderr: what, where, hint.
@@ -64,6 +68,9 @@ pub fn report(error: &impl Explain) -> String {
     }
     if let Some(hint) = error.hint() {
         text.push_str(&format!("  hint: {hint}\n"));
+    }
+    if let Some(note) = error.note() {
+        text.push_str(&format!("  note: {note}\n"));
     }
     text
 }

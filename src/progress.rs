@@ -90,6 +90,11 @@ impl Step {
         self.bar.inc(parts);
     }
 
+    /// So many parts more than were thought of are to be done.
+    pub fn lengthen(&self, parts: u64) {
+        self.bar.inc_length(parts);
+    }
+
     /// A part of this name begins, and the one before it is done.
     pub fn begin(&self, part: &str) {
         if self.begun.swap(true, Ordering::Relaxed) {

@@ -42,5 +42,6 @@ pub enum PlacementFormat {
     /// OpenCV's FileStorage (YAML) with calibrateHandEye's names, in mm
     Opencv,
     /// easy_handeye's calibration file (ROS 1), in m
+    #[value(alias = "easy_handeye")]
     EasyHandeye,
 }

@@ -48,7 +48,7 @@ pub struct TableFlags {
     /// What the columns are, in their order, those of all files side by side: j1,j2,...,-,x,y,z; `-` skips one; key `measurements.columns`
     #[arg(long, value_name = "NAME,NAME,...", allow_hyphen_values = true)]
     pub columns: Option<String>,
-    /// Units of joints and lengths: deg or rad, mm, m or um; key `measurements.units` [default: what the names say, else what fits the nominal robot]
+    /// Units of joints and lengths: deg or rad, mm, cm, m, um or in; key `measurements.units` [default: what the names say, else what fits the nominal robot]
     #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
     pub units: Option<String>,
 }

@@ -9,6 +9,20 @@ const PLACES: [&str; 2] = ["FILE", "DIR"];
 /// Endings of files that are named by their folder alone.
 const PICTURES: [&str; 5] = [".png", ".jpg", ".jpeg", ".tif", ".bmp"];
 
+/// Words that people make a flag of for what a command takes without one: pictures, poses, targets.
+const WITHOUT_FLAG: [&str; 8] = ["images", "pictures", "poses", "measurements", "table", "targets", "program", "file"];
+
+/// Words for a flag that share none with its name.
+const OTHER_WORDS: [(&str, &str); 7] = [
+    ("data", "measurements"),
+    ("table", "measurements"),
+    ("points", "measurements"),
+    ("measurements", "after"),
+    ("nominal", "robot"),
+    ("rig", "calibration"),
+    ("cameras", "calibration"),
+];
+
 /// Units of length that people write behind a number, mm.
 const UNITS_MM: [(&str, f64); 7] =
     [("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("inch", 25.4), ("in", 25.4), ("\"", 25.4), ("m", 1000.0)];
@@ -38,7 +52,17 @@ pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap
             _ => _ = error.insert(tip, ContextValue::Strings(near)),
         }
     }
-    let hint = hint(root, words, &error);
+    let mut built = root.clone();
+    built.build();
+    let command = words.iter().fold(&built, |at, word| at.find_subcommand(word).unwrap_or(at));
+    // The parser's own line leaves out what is optional, or has a flag that was typed as if it were required; and no flag is meant as a value here.
+    if error.get(ContextKind::Usage).is_some() {
+        error.insert(ContextKind::Usage, ContextValue::StyledStr(command.clone().render_usage()));
+    }
+    if error.kind() == ErrorKind::UnknownArgument {
+        error.remove(ContextKind::Suggested);
+    }
+    let hint = hint(&built, command, &error);
     (error, hint)
 }
 
@@ -56,8 +80,7 @@ fn is_slip(typed: &str, word: &str) -> bool {
     before[word.len()] <= (typed.len().max(word.len()) / 3).max(1)
 }
 
-fn hint(root: &Command, words: &[String], error: &clap::Error) -> Option<String> {
-    let command = words.iter().fold(root, |at, word| at.find_subcommand(word).unwrap_or(at));
+fn hint(root: &Command, command: &Command, error: &clap::Error) -> Option<String> {
     match (error.kind(), error.get(ContextKind::InvalidArg)) {
         (ErrorKind::UnknownArgument, Some(ContextValue::String(given))) => {
             without_flag(command, given).or_else(|| named_otherwise(command, given, error))
@@ -81,12 +104,26 @@ fn hint(root: &Command, words: &[String], error: &clap::Error) -> Option<String>
     }
 }
 
-/// For a flag that there is not: those that share most of its words, `--square-mm` for `--square-size`.
+/// For a flag that there is not: what is named without one, or the flags of another name, those that share most of its words: `--square-mm` for
+/// `--square-size`.
 fn named_otherwise(command: &Command, given: &str, error: &clap::Error) -> Option<String> {
     const MOST: usize = 4;
-    let typed: Vec<&str> = given.strip_prefix("--")?.split('-').collect();
+    let name = given.strip_prefix("--")?;
+    let typed: Vec<&str> = name.split('-').collect();
     if error.get(ContextKind::SuggestedArg).is_some() {
         return None;
+    }
+    if let Some(first) = command.get_positionals().next().filter(|_| WITHOUT_FLAG.contains(&name)) {
+        let value = first.get_value_names().and_then(|names| names.first())?;
+        let command = command.get_bin_name().unwrap_or(command.get_name());
+        return Some(format!("it is named without a flag: `{command} {value}`"));
+    }
+    let other = |(word, flag): &(&str, &str)| {
+        let arg = command.get_arguments().find(|arg| *word == name && arg.get_long() == Some(flag))?;
+        Some(format!("there is {}", with_value(arg)))
+    };
+    if let Some(said) = OTHER_WORDS.iter().find_map(other) {
+        return Some(said);
     }
     // The words that both have, of all that either has, in thousandths.
     let shared = |arg: &Arg| {
@@ -96,12 +133,15 @@ fn named_otherwise(command: &Command, given: &str, error: &clap::Error) -> Optio
     };
     let best = command.get_arguments().filter_map(shared).max()?;
     let flags = command.get_arguments().filter(|arg| shared(arg) == Some(best)).take(MOST);
-    let said = |arg: &Arg| {
-        let value = arg.get_value_names().and_then(|names| names.first().map(|name| format!(" {name}")));
-        format!("`--{}{}`", arg.get_long().unwrap_or_default(), value.unwrap_or_default())
-    };
-    let flags: Vec<String> = flags.map(said).collect();
+    let flags: Vec<String> = flags.map(with_value).collect();
     Some(format!("there is {}", flags.join(" and ")))
+}
+
+/// A flag with what it takes: `--square-mm MM`.
+fn with_value(arg: &Arg) -> String {
+    let names = arg.get_value_names().filter(|_| arg.get_action().takes_values());
+    let value = names.and_then(|names| names.first().map(|name| format!(" {name}")));
+    format!("`--{}{}`", arg.get_long().unwrap_or_default(), value.unwrap_or_default())
 }
 
 /// For flags that are missing: others that do in their place.
@@ -176,10 +216,15 @@ mod tests {
     use super::*;
     use crate::cli::Cli;
 
-    fn of(words: &[&str]) -> Option<String> {
+    fn answered(words: &[&str]) -> (String, Option<String>) {
         let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
         let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-        mended(&Cli::command(), &words, error).1
+        let (error, hint) = mended(&Cli::command(), &words, error);
+        (error.to_string(), hint)
+    }
+
+    fn of(words: &[&str]) -> Option<String> {
+        answered(words).1
     }
 
     #[test]
@@ -211,12 +256,38 @@ mod tests {
     }
 
     #[test]
+    fn what_is_named_without_a_flag_is_said_and_so_are_flags_of_another_name() {
+        for (words, says) in [
+            (&["measure", "--poses", "x"][..], "it is named without a flag: `stereocal measure POSES`"),
+            (
+                &["locate", "--measurements", "x", "--robot", "r"],
+                "it is named without a flag: `stereocal locate POSES`",
+            ),
+            (&["camera-check", "--images", "x"], "it is named without a flag: `stereocal camera-check IMAGES`"),
+            (&["compensate", "--program", "x"], "it is named without a flag: `stereocal compensate TARGETS`"),
+            (&["identify", "--table", "x"], "there is `--measurements FILE`"),
+            (&["plan", "--measurements", "x"], "there is `--after MEASUREMENTS`"),
+            (&["measure", "x", "--rig", "y"], "there is `--calibration FILE`"),
+            (&["compensate", "x", "--only-targets"], "there is `--joint-targets-only`"),
+        ] {
+            assert_eq!(of(words).as_deref(), Some(says), "{words:?}");
+        }
+        assert_eq!(of(&["measure", "x", "--blur", "y"]), None);
+    }
+
+    #[test]
+    fn usage_shows_what_a_command_takes_and_not_what_was_typed() {
+        for words in
+            [&["measure", "--poses", "x", "--square-mm", "10"][..], &["measure"], &["measure", "x", "--rig", "y"]]
+        {
+            let said = answered(words).0;
+            assert!(said.contains("Usage: stereocal measure [OPTIONS] <POSES> [RIGHT]"), "{said}");
+            assert!(!said.contains("to pass"), "{said}");
+        }
+    }
+
+    #[test]
     fn tips_stay_where_they_are_a_slip_away() {
-        let said = |words: &[&str]| {
-            let words: Vec<String> = words.iter().map(|w| (*w).to_owned()).collect();
-            let error = Cli::try_parse_from(std::iter::once("stereocal".to_owned()).chain(words.clone())).unwrap_err();
-            mended(&Cli::command(), &words, error).0.to_string()
-        };
         for (typed, tip) in [
             (&["identfy"][..], Some("identify")),
             (&["identify", "--sed", "3"], Some("--seed")),
@@ -225,7 +296,7 @@ mod tests {
             (&["export", "calibration", "--format", "matlab"], None),
             (&["export", "calibration", "--format", "opncv"], Some("opencv")),
         ] {
-            let said = said(typed);
+            let said = answered(typed).0;
             assert_eq!(said.contains("tip:"), tip.is_some(), "{typed:?}: {said}");
             assert!(tip.is_none_or(|tip| said.contains(tip)), "{typed:?}: {said}");
         }

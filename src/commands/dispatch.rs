@@ -1,6 +1,8 @@
 //! From the command line to the command that it names.
 
-use super::error::Result;
+use camino::Utf8Path;
+
+use super::error::{BesideEarlier, Earlier, Error, Result};
 use super::outcome::Outcome;
 use super::{
     board, camera_check, compensate, export, identify, locate, measure, plan, rectify, report, robot, simulate, start,
@@ -8,7 +10,7 @@ use super::{
 };
 use crate::cli::{Cli, Command};
 use crate::config::{self, Config};
-use crate::files::provenance::Run;
+use crate::files::provenance::{Provenance, Run};
 use crate::progress;
 
 /// Runs what was typed.
@@ -25,24 +27,58 @@ pub fn run(cli: Cli) -> Result<Outcome> {
         force: false,
         inputs: Config::file(cli.config.as_deref()).into_iter().collect(),
     };
-    match cli.command {
-        Command::CameraCheck(args) => camera_check::run(&args, &config, run),
-        Command::Measure(args) => measure::run(&args, &config, run),
-        Command::Identify(args) => identify::run(&args, &config, run),
-        Command::Verify(args) => verify::run(&args, &config, run),
-        Command::Locate(args) => locate::run(&args, &config, run),
-        Command::Board(args) => board::run(&args, &config, run),
-        Command::Rectify(args) => rectify::run(&args, &config, run),
-        Command::Report(args) => report::run(&args, &config, run),
-        Command::Simulate(args) => simulate::run(&args, &config, run),
-        Command::Plan(args) => plan::run(&args, &config, run),
-        Command::Compensate(args) => compensate::run(&args, &config, run),
-        Command::Export(args) => export::run(&args, &config, run),
-        Command::Init(args) => start::init::run(&args, run),
-        Command::Guide(args) => start::guide::run(&args, run),
-        Command::Completions(args) => Ok(start::shell::completions(&args)),
-        Command::Man(args) => start::shell::man(&args, run),
-        Command::Robot(args) => robot::run(&args, &config, run),
+    let before = earlier(&cli.command, &config);
+    let now = || before.as_ref().and_then(|earlier| Earlier::of(&earlier.file));
+    command(&cli.command, &config, run).map_err(|error| match now().filter(|now| before.as_ref() == Some(now)) {
+        Some(earlier) => Error::BesideEarlier(Box::new(BesideEarlier { error, earlier })),
+        None => error,
+    })
+}
+
+fn command(command: &Command, config: &Config, run: Run) -> Result<Outcome> {
+    match command {
+        Command::CameraCheck(args) => camera_check::run(args, config, run),
+        Command::Measure(args) => measure::run(args, config, run),
+        Command::Identify(args) => identify::run(args, config, run),
+        Command::Verify(args) => verify::run(args, config, run),
+        Command::Locate(args) => locate::run(args, config, run),
+        Command::Board(args) => board::run(args, config, run),
+        Command::Rectify(args) => rectify::run(args, config, run),
+        Command::Report(args) => report::run(args, config, run),
+        Command::Simulate(args) => simulate::run(args, config, run),
+        Command::Plan(args) => plan::run(args, config, run),
+        Command::Compensate(args) => compensate::run(args, config, run),
+        Command::Export(args) => export::run(args, config, run),
+        Command::Init(args) => start::init::run(args, run),
+        Command::Guide(args) => start::guide::run(args, run),
+        Command::Completions(args) => Ok(start::shell::completions(args)),
+        Command::Man(args) => start::shell::man(args, run),
+        Command::Robot(args) => robot::run(args, config, run),
+    }
+}
+
+/// The result that an earlier run of such a command left in the results folder.
+fn earlier(command: &Command, config: &Config) -> Option<Earlier> {
+    let (out, name) = match command {
+        Command::CameraCheck(args) if args.against.is_some() => (&args.output.out, "recheck.json"),
+        Command::CameraCheck(args) => (&args.output.out, "camera-check.json"),
+        Command::Measure(args) => (&args.output.out, "measure.json"),
+        Command::Identify(args) => (&args.output.out, "identification.json"),
+        Command::Locate(args) => (&args.measure.output.out, "placement.json"),
+        Command::Plan(args) => (&args.output.out, "plan.json"),
+        Command::Compensate(args) => (&args.output.out, "compensate.json"),
+        Command::Rectify(args) => (&args.output.out, "rectified.json"),
+        _ => return None,
+    };
+    Earlier::of(&out.as_ref().unwrap_or(&config.out).join(name))
+}
+
+impl Earlier {
+    /// `None` where there is none, or no date in it.
+    fn of(file: &Utf8Path) -> Option<Earlier> {
+        let date = Provenance::of_json(file)?.date;
+        let written = file.metadata().and_then(|file| file.modified()).ok();
+        Some(Earlier { file: file.to_owned(), date, written })
     }
 }
 

@@ -1,5 +1,7 @@
 //! The sum of what can end a command.
 
+use camino::Utf8PathBuf;
+
 use crate::diagnostic::{Explain, Status};
 
 /// Result of a command.
@@ -36,6 +38,26 @@ pub enum Error {
     /// Figures and pages.
     #[error(transparent)]
     Report(#[from] crate::report::Error),
+    /// One of these, in a folder that holds the result of an earlier run.
+    #[error(transparent)]
+    BesideEarlier(Box<BesideEarlier>),
+}
+
+/// What ended a command, and what stands in its results folder from before.
+#[derive(Debug, thiserror::Error)]
+#[error("{error}")]
+pub struct BesideEarlier {
+    #[source]
+    pub(super) error: Error,
+    pub(super) earlier: Earlier,
+}
+
+/// The result of an earlier run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Earlier {
+    pub(super) file: Utf8PathBuf,
+    pub(super) date: String,
+    pub(super) written: Option<std::time::SystemTime>,
 }
 
 impl Error {
@@ -50,6 +72,7 @@ impl Error {
             Error::Plan(e) => e,
             Error::Simulate(e) => e,
             Error::Report(e) => e,
+            Error::BesideEarlier(beside) => beside.error.explain(),
         }
     }
 }
@@ -63,5 +86,10 @@ impl Explain for Error {
     }
     fn hint(&self) -> Option<String> {
         self.explain().hint()
+    }
+    fn note(&self) -> Option<String> {
+        let Error::BesideEarlier(beside) = self else { return None };
+        let Earlier { file, date, .. } = &beside.earlier;
+        Some(format!("{file} and what stands beside it are of an earlier run ({date})"))
     }
 }

@@ -4,6 +4,7 @@ use camino::Utf8Path;
 
 use crate::diagnostic::Status;
 use crate::files::provenance::{Digested, Provenance};
+use crate::formats::calibration::Calibrated;
 use crate::formats::recheck::{CheckedAgainst, Standing};
 use crate::progress;
 use crate::robot::Check;
@@ -14,8 +15,16 @@ pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     let changed =
         file.file_name().zip(file.parent()).and_then(|(name, folder)| changed_since(folder, "verify.json", name));
     changed.iter().for_each(progress::warn);
-    let is_against = check.is_some_and(Check::is_against) || changed.is_some();
-    if is_against { Status::OutOfTolerance } else { Status::Done }
+    let advised = check.map_or(Status::Done, |check| check.advice.status());
+    if changed.is_some() { Status::OutOfTolerance } else { advised }
+}
+
+/// Warns of what a rig's own calibration says against it, and gives it. What is made with the rig states its own uncertainty: the status is not
+/// the rig's.
+pub fn heed_rig(rig: &Calibrated) -> Vec<String> {
+    let doubts = rig.doubts();
+    doubts.iter().for_each(progress::warn);
+    doubts
 }
 
 /// What the last check beside a result says against it, if it was of that very result.

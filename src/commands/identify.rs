@@ -5,13 +5,14 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::{Outcome, Result};
 use crate::cli::{Identify, TableFlags};
 use crate::config::Config;
-use crate::diagnostic::{Status, count};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::{known, shared, still};
 use crate::identify::examine::{self, Examined};
+use crate::identify::finding::Finding;
 use crate::identify::judge::placement::Placed;
 use crate::identify::record::{self, Advice, Findings, Record, quality};
 use crate::identify::run::{Identification, identify, step_count};
@@ -42,8 +43,8 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let (out, measured) = open(args, &out, run, &source.paths(), file.as_deref())?;
-    if let Some(record) = &measured {
+    let (out, Measured { record, stale }) = open(args, &out, run, &source.paths(), file.as_deref())?;
+    if let Some(record) = &record {
         shared::take(record, &mut set);
     }
     shared::suppose_scale(&mut set);
@@ -54,10 +55,11 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
         examine::in_hand::refuse(&set, &nominal)?;
     }
     let doubts = (unexplained.is_some(), along.robots.is_some());
-    let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &|step| bar.begin(step))?;
+    let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &bar)?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
-    let findings = Findings::new(findings, (against, unexplained), of_fit, &along, &set, &found);
+    let mut findings = Findings::new(findings, (against, unexplained), of_fit, &along, &set, &found);
+    findings.doubts.splice(0..0, stale);
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;
@@ -70,7 +72,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     } else {
         report::identify::summary(&record, file.as_deref(), placed.is_some(), &out)
     };
-    let status = if record.advice == Advice::DoNotUse { Status::OutOfTolerance } else { Status::Done };
+    let status = record.advice.status();
     Ok(Outcome { stdout, status })
 }
 
@@ -89,18 +91,20 @@ fn search(
     settings: &Settings,
     seed: u64,
     (unexplained, several_robots): (bool, bool),
-    step: &(dyn Fn(&str) + Sync),
+    bar: &progress::Step,
 ) -> std::result::Result<Searched, Error> {
+    let step = |step: &str| bar.begin(step);
     if settings.method.is_none() && (unexplained || several_robots) {
         let one = Settings { method: Some(Method::TrustRegion), ..settings.clone() };
-        let found = identify(set, nominal, &one, seed, step)?;
+        let found = identify(set, nominal, &one, seed, &step)?;
         if several_robots || !record::findings::is_explained(&found) {
             let not_run = "only trust-region was run: the other methods search the same neighbourhood of the robot file, and what speaks against \
                            the result would stay; `--method stapso` runs one of them all the same";
             return Ok(Searched { found, not_run: Some(not_run.to_owned()) });
         }
+        bar.lengthen(step_count(&one));
     }
-    Ok(Searched { found: identify(set, nominal, settings, seed, step)?, not_run: None })
+    Ok(Searched { found: identify(set, nominal, settings, seed, &step)?, not_run: None })
 }
 
 /// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says is not said before it, unless it goes elsewhere.
@@ -165,48 +169,61 @@ pub fn read(source: &Source, robot: &Robot) -> Result<Vec<Measurement>> {
     Ok(rows)
 }
 
-/// The results folder, once nothing is in the way of what will be written, and the `measure.json` that is about the measurements.
+/// What stands beside the measurements.
+#[derive(Default)]
+struct Measured {
+    /// The `measure.json` that is about them.
+    record: Option<Utf8PathBuf>,
+    /// That the rig beside them was calibrated again since.
+    stale: Option<Finding>,
+}
+
+/// The results folder, once nothing is in the way of what will be written, and what stands beside the measurements.
 fn open(
     args: &Identify,
     out: &Utf8Path,
     run: Run,
     measurements: &[Utf8PathBuf],
     robot: Option<&Utf8Path>,
-) -> Result<(OutDir, Option<Utf8PathBuf>)> {
+) -> Result<(OutDir, Measured)> {
     let run = Run { force: args.output.force, ..run };
     let inputs: Vec<&Utf8Path> = measurements.iter().map(Utf8PathBuf::as_path).chain(robot).collect();
     let out = OutDir::open(out)?.for_run(&run, &inputs);
     out.check_free(&["identification.json", IDENTIFIED, PLACEMENT, "identify.html"])?;
     let measured = match measurements {
         [only] => check_calibration(&out, only),
-        _ => None,
+        _ => Measured::default(),
     };
     Ok((out, measured))
 }
 
-/// The `measure.json` beside the measurements, where it is about them. Says which calibration they were made with, and warns where the one
-/// beside them is another.
-fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Option<Utf8PathBuf> {
+/// The `measure.json` beside the measurements, where it is about them, and whether the calibration beside them is another than the one that they
+/// were made with.
+fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Measured {
     let folder = measurements.parent().unwrap_or(Utf8Path::new(""));
     let record = folder.join("measure.json");
     // Without provenance nothing says that they belong together but what they hold.
-    let Some(measured_by) = Provenance::of_json(&record) else { return Some(record) };
-    let csv = Digested::read(measurements)?;
-    if !measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256) {
-        return None;
+    let Some(measured_by) = Provenance::of_json(&record) else {
+        return Measured { record: Some(record), stale: None };
+    };
+    let csv = Digested::read(measurements);
+    if !csv.is_some_and(|csv| measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256)) {
+        return Measured::default();
     }
     let calibration = folder.join("calibration.json");
     let used = measured_by.inputs.last();
-    if let (Some(used), Some(here)) = (used, Digested::read(&calibration))
-        && !used.same_content(&here)
-    {
-        progress::warn(format!(
-            "the measurements were made with another calibration than {calibration} ({} of {}); run `stereocal measure` again",
-            used.file, measured_by.date
-        ));
-    }
+    let stale =
+        used.zip(Digested::read(&calibration)).filter(|(used, here)| !used.same_content(here)).map(|(used, _)| {
+            Finding::new(
+                format!(
+                    "the measurements were made with another calibration than {calibration} ({} of {})",
+                    used.file, measured_by.date
+                ),
+                "run `stereocal measure` again",
+            )
+        });
     out.measured_by(measured_by);
-    Some(record)
+    Measured { record: Some(record), stale }
 }
 
 /// The robot file that is named, or `robot.toml` in the working directory where it is there.

@@ -3,6 +3,7 @@
 use camino::Utf8Path;
 use nalgebra::Vector3;
 
+use super::heed::heed_rig;
 use super::identify::robot_file;
 use super::{Outcome, Result};
 use crate::cli::{Plan as Arguments, PlanKind};
@@ -38,7 +39,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
     let calibrated = calibration::read(&rig_file)?;
-    calibrated.doubts().into_iter().for_each(progress::warn);
+    heed_rig(&calibrated);
     let Calibrated { rig, noise, pair_excess, .. } = calibrated;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {

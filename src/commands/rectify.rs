@@ -4,6 +4,7 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
+use super::heed::heed_rig;
 use super::{Outcome, Result};
 use crate::cli::Rectify;
 use crate::config::Config;
@@ -33,7 +34,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let calibrated = calibration::read(&rig_file)?;
-    calibrated.doubts().into_iter().for_each(progress::warn);
+    let mut doubts = heed_rig(&calibrated);
     let calibration::Calibrated { rig, board, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
@@ -81,11 +82,20 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
+    let status = rows(&file);
     let json = out.write_json("rectified.json", &file)?;
-    let page = report::rectify::page(&file, &rectified, shown.as_ref())?;
+    doubts.extend(report::rectify::doubt(&file));
+    let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status })
+}
+
+/// Says whether rows do not agree; with which status the run then ends at best.
+fn rows(file: &RectifiedFile) -> Status {
+    let doubt = report::rectify::doubt(file);
+    doubt.iter().for_each(progress::warn);
+    if doubt.is_some() { Status::OutOfTolerance } else { Status::Done }
 }
 
 /// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture

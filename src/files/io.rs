@@ -5,8 +5,10 @@ use std::io::{Read, Write};
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde_json::error::Category;
 
 use super::kind::kind;
+use super::refusal::plain;
 use crate::diagnostic::{Explain, Place};
 
 /// Result of reading or writing a file.
@@ -128,8 +130,28 @@ fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, mos
             let hint = (!hints.is_empty()).then(|| hints.join(" "));
             Err(Error::Missing { what, path: path.to_owned(), hint })
         }
-        Err(source) => Err(Error::Io { action: "read", path: path.to_owned(), source }),
+        Err(source) => Err(unreadable(path, what, source)),
     }
+}
+
+/// A file that is there and cannot be read; of a folder what it holds, as one of its files is meant.
+pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -> Error {
+    const NAMED: usize = 4;
+    const READ: [&str; 11] = ["csv", "tsv", "txt", "xlsx", "xls", "ods", "json", "toml", "yaml", "yml", "urdf"];
+    if source.kind() != std::io::ErrorKind::IsADirectory {
+        return Error::Io { action: "read", path: path.to_owned(), source };
+    }
+    let files = path.read_dir_utf8().into_iter().flatten().flatten().filter(|entry| {
+        entry.path().is_file() && entry.path().extension().is_some_and(|ending| READ.contains(&ending))
+    });
+    let mut names: Vec<String> = files.map(|entry| format!("`{}`", entry.path())).collect();
+    names.sort();
+    names.truncate(NAMED);
+    let hint = match names.is_empty() {
+        true => "name a file; this folder holds none that is read".to_owned(),
+        false => format!("name a file in it: {}", names.join(", ")),
+    };
+    Error::format(path, None, format!("{what}: this is a folder, and a file is needed"), Some(&hint))
 }
 
 /// A file of this name in the folder that results go to unless another is named.
@@ -147,7 +169,14 @@ pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
         (true, Some(other)) if !what.split(' ').any(|word| other.split(' ').any(|own| own == word)) => {
             Error::format(path, None, format!("{what}: this is {other}"), hint)
         }
-        (true, _) => Error::format(path, Some(e.line() as u64), format!("{what}: {e}"), None),
+        (true, _) => {
+            let fault = match e.classify() {
+                Category::Eof => "it ends in the middle: the file is not whole".to_owned(),
+                Category::Syntax => "what stands here is no JSON".to_owned(),
+                Category::Data | Category::Io => plain(&e.to_string()),
+            };
+            Error::format(path, Some(e.line() as u64), format!("{what}: {fault}"), hint)
+        }
     })
 }
 
@@ -163,9 +192,9 @@ pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
         let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
         // Some messages do not say which key it is.
         let key = e.span().and_then(|span| text.get(span)).filter(|key| !key.is_empty() && key.len() < 40);
-        let key = key.filter(|key| !e.message().contains('`') && !key.contains('\n'));
+        let key = key.filter(|key| !e.message().contains(['`', '"']) && !key.contains('\n'));
         let key = key.map_or(String::new(), |key| format!(": `{key}`"));
-        Error::format(path, line, format!("{what}: {}{key}", e.message()), None)
+        Error::format(path, line, format!("{what}: {}{key}", plain(e.message())), None)
     })
 }
 
@@ -264,6 +293,16 @@ mod tests {
         let refused = tempfile::NamedTempFile::new_in("/nowhere at all").unwrap_err();
         assert!(refused.to_string().contains("nowhere"));
         assert!(!without_path(refused).to_string().contains("nowhere"));
+    }
+
+    #[test]
+    fn a_folder_in_place_of_a_file_is_answered_with_the_files_in_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = Utf8Path::from_path(folder.path()).unwrap();
+        let said = || read_text(path, "robot file", None).unwrap_err();
+        assert!(said().to_string().contains("this is a folder") && said().hint().unwrap().contains("holds none"));
+        std::fs::write(path.join("robot.toml"), "").unwrap();
+        assert_eq!(said().hint().unwrap(), format!("name a file in it: `{path}/robot.toml`"));
     }
 
     #[test]

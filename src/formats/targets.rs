@@ -36,7 +36,7 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
     let own = |table: &Table| ["j1_deg", "j1_mm", "x_mm"].iter().any(|name| table.column(name).is_some());
     let table = match table {
         Ok(table) if own(&table) => table,
-        Err(e @ crate::files::Error::Missing { .. }) => return Err(e),
+        Err(e) if path.is_dir() || matches!(e, crate::files::Error::Missing { .. }) => return Err(e),
         _ => return of_other_names(path, robot),
     };
     // `plan` and `measure` call it a pose.

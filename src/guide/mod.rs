@@ -88,7 +88,8 @@ impl Page {
         self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' '])
     }
 
-    /// The page as a terminal shows it: what a picture shows in words in place of the picture.
+    /// The page as a terminal shows it: what a picture shows in words in place of the picture, and the rows of a wide table as lists of their
+    /// cells.
     pub fn plain(&self) -> String {
         let mut plain = String::with_capacity(self.text.len());
         let mut rest = self.text;
@@ -101,8 +102,61 @@ impl Page {
             plain.extend([before, "[picture: ", words, "]"]);
             rest = behind;
         }
-        plain + rest
+        with_narrow_tables(&(plain + rest))
     }
+}
+
+/// Columns of a terminal that a line of the pages keeps to.
+const COLUMNS: usize = 100;
+
+/// The text with each row of a table that is wider than a terminal as a list: its first cell, then each other one below the name of its column.
+fn with_narrow_tables(text: &str) -> String {
+    let mut narrow = String::with_capacity(text.len());
+    let mut lines = text.split_inclusive('\n').peekable();
+    while let Some(line) = lines.next() {
+        if line.starts_with("[picture: ") && line.chars().count() > COLUMNS {
+            narrow += &wrapped(line.trim_end(), ["", ""]);
+            continue;
+        }
+        if !line.starts_with('|') {
+            narrow.push_str(line);
+            continue;
+        }
+        let mut table = vec![line];
+        while let Some(row) = lines.next_if(|row| row.starts_with('|')) {
+            table.push(row);
+        }
+        if table.iter().all(|row| row.chars().count() <= COLUMNS + 1) {
+            narrow.extend(table);
+            continue;
+        }
+        let cells = |row: &str| -> Vec<String> {
+            row.trim().trim_matches('|').split(" | ").map(|cell| cell.trim().to_owned()).collect()
+        };
+        let header = cells(table[0]);
+        for row in table.iter().skip(2).map(|row| cells(row)) {
+            for (k, (name, cell)) in header.iter().zip(&row).enumerate().filter(|(_, (_, cell))| !cell.is_empty()) {
+                let said = if k == 0 || name.is_empty() { cell.clone() } else { format!("{name}: {cell}") };
+                narrow += &wrapped(&said, if k == 0 { ["- ", "  "] } else { ["  ", "    "] });
+            }
+        }
+    }
+    narrow
+}
+
+/// Words in lines of at most [`COLUMNS`], the first and the others with their indents.
+fn wrapped(text: &str, [first, others]: [&str; 2]) -> String {
+    let (mut lines, mut line) = (String::new(), first.to_owned());
+    let mut is_empty = true;
+    for word in text.split(' ') {
+        if !is_empty && line.chars().count() + 1 + word.chars().count() > COLUMNS {
+            lines += &format!("{line}\n");
+            (line, is_empty) = (others.to_owned(), true);
+        }
+        line += &format!("{}{word}", if is_empty { "" } else { " " });
+        is_empty = false;
+    }
+    lines + &line + "\n"
 }
 
 #[cfg(test)]
@@ -135,6 +189,24 @@ mod tests {
         for picture in PICTURES {
             assert!(asked.iter().any(|name| picture.path.ends_with(name)), "{} stands in no page", picture.path);
         }
+    }
+
+    #[test]
+    fn lines_of_a_terminal_are_not_longer_than_it_is_wide() {
+        for page in PAGES {
+            let text = page.plain();
+            let mut is_code = false;
+            for line in text.lines() {
+                is_code ^= line.starts_with("```");
+                let words = line.trim_start().matches(' ').count();
+                assert!(line.chars().count() <= COLUMNS || is_code || words < 5, "{}: {line}", page.topic);
+            }
+        }
+        let narrow = with_narrow_tables("a\n| it says | do |\n|---|---|\n| b | c |\n");
+        assert_eq!(narrow, "a\n| it says | do |\n|---|---|\n| b | c |\n");
+        let wide = format!("| it says | do |\n|---|---|\n| b | {} |\n| d | |\nend\n", "word ".repeat(30).trim());
+        let narrow = with_narrow_tables(&wide);
+        assert!(narrow.starts_with("- b\n  do: word word") && narrow.ends_with("word\n- d\nend\n"), "{narrow}");
     }
 
     #[test]

@@ -189,7 +189,8 @@ impl Table<'_> {
 
 /// Reads `poses.csv`.
 pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
-    let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...";
+    let hint = "a poses folder holds left/, right/ and poses.csv with the columns pose,group,role,j1_deg,...: \
+                `stereocal init` writes one to start from";
     let table = Table::read(path, "list of poses", hint)?;
     // A pose of `measure` is the stem of its pictures; its number would not do.
     table.require("pose")?;

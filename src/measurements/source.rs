@@ -166,9 +166,9 @@ impl Source {
             Ok((*line, name.map_or_else(|| (row + 1).to_string(), |column| cells[column].to_owned()), readings))
         };
         let said = format!(
-            "{}: {} targets; joints from {} in {}",
+            "{}: {}; joints from {} in {}",
             parts[0].file_name(),
-            parts[0].rows.len(),
+            crate::diagnostic::count(parts[0].rows.len(), "target"),
             listed(&parts, &picked.joints),
             unit.word()
         );

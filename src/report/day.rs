@@ -30,12 +30,12 @@ impl Day {
     pub fn is_good(&self) -> bool {
         self.breaks.is_empty()
             && self.check.as_ref().is_none_or(|check| text(check, "/verdict") == "pass")
-            && !self.is_advised_against()
+            && !matches!(self.advice(), "check" | "do-not-use")
     }
 
-    /// Whether `identify` advised against the robot that it found.
-    fn is_advised_against(&self) -> bool {
-        self.robot.as_ref().is_some_and(|robot| text(robot, "/advice") == "do-not-use")
+    /// What `identify` said of the robot that it found.
+    fn advice(&self) -> &str {
+        self.robot.as_ref().map_or("", |robot| text(robot, "/advice"))
     }
 }
 
@@ -137,7 +137,11 @@ fn robot_words(robot: &Value) -> String {
         return format!("do not use the identified robot: {}", text(robot, "/reason"));
     }
     let after = chosen(robot).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
-    format!("mean distance error {} mm before, {after} mm after", mm(robot, "/before/verify/mean_abs_mm"))
+    let doubt = match text(robot, "/advice") {
+        "check" => format!("; check before you use the identified robot: {}", text(robot, "/reason")),
+        _ => String::new(),
+    };
+    format!("mean distance error {} mm before, {after} mm after{doubt}", mm(robot, "/before/verify/mean_abs_mm"))
 }
 
 /// The number that matters most of each part that is there.
@@ -166,13 +170,16 @@ fn numbers(day: &Day) -> Vec<(String, String)> {
 pub fn page(day: &Day) -> String {
     let tone = match (day.is_good(), &day.check) {
         (true, Some(_)) => Tone::Good,
-        _ if day.is_advised_against() => Tone::Bad,
+        _ if day.advice() == "do-not-use" => Tone::Bad,
         _ if day.check.as_ref().is_some_and(|check| text(check, "/verdict") == "fail") => Tone::Bad,
         _ => Tone::Doubtful,
     };
     let headline = match &day.check {
         _ if !day.breaks.is_empty() => "The parts do not belong together".to_owned(),
-        _ if day.is_advised_against() => "Do not use the identified robot".to_owned(),
+        _ if day.advice() == "do-not-use" => "Do not use the identified robot".to_owned(),
+        Some(check) if day.advice() == "check" && text(check, "/verdict") == "pass" => {
+            "Check the identified robot before use".to_owned()
+        }
         Some(check) => format!("Rig: {}", text(check, "/verdict").to_uppercase()),
         None => "Without a camera check".to_owned(),
     };

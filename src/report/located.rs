@@ -21,15 +21,18 @@ fn line(what: &str, record: &TransformRecord) -> String {
     format!("{what}: {shift}{turn}")
 }
 
-/// The placement, the error to expect, and whether the robot agrees with the points.
+/// Whether the robot agrees with the points, the placement, the error to expect.
 pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
     let poses = fit.poses;
     let mut lines = Vec::new();
+    if fit.contradicted {
+        lines.push(format!("do not use this placement: {}", Fit::CONTRADICTED));
+    }
     for group in &placement.groups {
         let sensor = if placement.by_instrument { "instrument" } else { "rig" };
         lines.push(line(&format!("base from {sensor}, {}", group.group), &group.base_from_rig));
         lines.push(format!(
-            "  error to expect of the target: {:.4} mm on average, 95 % below {:.4}; held out {}",
+            "  error to expect of the target: {:.4} mm on average, 95 % below {:.4}; {} on poses held out",
             group.error_mm.mean_mm,
             group.error_mm.p95_mm,
             number(group.held_out.mean_abs_mm, 4)
@@ -45,9 +48,6 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
             fit.rms_mm, fit.chi_square
         ),
     });
-    if fit.contradicted {
-        lines.push(Fit::CONTRADICTED.to_owned());
-    }
     lines.push(format!("95 % intervals; covariances: {}", out.join(PLACEMENT)));
     lines.join("\n") + "\n"
 }

@@ -50,6 +50,8 @@ pub struct Extras {
     pub thumbnails: Vec<Thumbnail>,
     /// Distances to the centre; empty where no robot of so many joints is known.
     pub distances: Vec<Distance>,
+    /// What is said against the rig.
+    pub doubts: Vec<String>,
 }
 
 /// The short text on stdout.
@@ -103,9 +105,10 @@ fn numbers(file: &MeasureFile) -> [(String, String); 3] {
 }
 
 /// Green only where every pose was measured and everything agrees with what was known before.
-fn tone(series: &Series, file: &MeasureFile) -> Tone {
+fn tone(series: &Series, file: &MeasureFile, doubts: &[String]) -> Tone {
     match &series.judgement {
         judgement if judgement.ends_the_run() => Tone::Bad,
+        _ if !doubts.is_empty() => Tone::Doubtful,
         Judgement::Agrees if file.poses == file.measured && file.chi_square_is_usual() => Tone::Good,
         _ => Tone::Doubtful,
     }
@@ -123,8 +126,8 @@ pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Ext
         })
         .collect();
     let content = html! {
-        (page::verdict(tone(series, file), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file, short))))
-        (page::warnings(&file.warnings))
+        (page::verdict(tone(series, file, &extras.doubts), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file, short))))
+        (page::warnings(&[extras.doubts.as_slice(), &file.warnings].concat()))
         @if !missing.is_empty() {
             h2 { "Poses without a measurement" }
             (page::table(&["pose", "status", "why"], &missing))

@@ -16,12 +16,14 @@ use crate::robot::Robot;
 
 /// The figures on the terminal.
 pub fn summary(record: &PlanFile) -> String {
-    let mut table = Table::new(["samples", "this plan, mm", "the paper's, mm"]);
+    let columns = ["samples", "this plan, mm", "the paper's, mm"];
+    let columns = columns.into_iter().take(if record.paper.is_some() { 3 } else { 2 });
+    let mut table = Table::new(columns);
     for expected in &record.plan.expected {
         let same = |e: &&Expected| e.poses == expected.poses;
-        let paper = record.paper.as_ref().and_then(|paper| paper.expected.iter().find(same));
-        let paper = paper.map_or_else(String::new, |e| number(Some(e.rms_mm), 4));
-        table.row([expected.poses.to_string(), number(Some(expected.rms_mm), 4), paper]);
+        let of = |e: &Expected| number(Some(e.rms_mm), 4);
+        let paper = record.paper.iter().map(|paper| paper.expected.iter().find(same).map_or_else(String::new, of));
+        table.row([expected.poses.to_string(), of(expected)].into_iter().chain(paper));
     }
     let of = |d: &Determined| {
         let o = d.accuracy.observability.as_ref();
@@ -37,8 +39,9 @@ pub fn summary(record: &PlanFile) -> String {
         )
     };
     let mut text = format!("this plan:   {}\n", of(&record.plan));
-    if let Some(paper) = &record.paper {
-        text += &format!("the paper's: {}\n", of(paper));
+    match &record.paper {
+        Some(paper) => text += &format!("the paper's: {}\n", of(paper)),
+        None => text += "the paper's plan is left out: this robot does not reach its poses before these cameras\n",
     }
     if !record.plan.accuracy.zero.is_empty() {
         text += &format!("not determined: {}\n", record.plan.accuracy.zero.join(", "));
@@ -117,11 +120,16 @@ fn curve(record: &PlanFile) -> Result<maud::Markup> {
     if let Some(paper) = &record.paper {
         plot = plot.line("as planned by Shi et al.", &line(paper));
     }
-    Ok(page::figure(
-        &plot.svg()?,
-        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise. Shi et al. visit points on \
-         the same spheres with one orientation of the flange.",
-    ))
+    let of_paper = match record.paper {
+        Some(_) => " Shi et al. visit points on the same spheres with one orientation of the flange.",
+        // The first few poses are planned without a comparison.
+        None if record.plan.expected.is_empty() => "",
+        None => " This robot does not reach the poses of Shi et al. before these cameras.",
+    };
+    let caption = format!(
+        "Where the line is flat, more poses do not help: the rest comes from what the plan does not vary, not from noise.{of_paper}"
+    );
+    Ok(page::figure(&plot.svg()?, &caption))
 }
 
 /// Places of the spheres by thirds of the expected error.

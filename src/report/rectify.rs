@@ -22,6 +22,21 @@ const LINES: u32 = 24;
 /// Length at which the largest difference is drawn, as a share of the picture's width.
 const LONGEST_ARROW: f64 = 0.06;
 
+/// Rows that differ by more, px RMS, are no common ones: dense stereo looks for a point along one row.
+const AGREE_PX: f64 = 0.5;
+
+/// What rows that do not agree mean.
+pub fn doubt(file: &RectifiedFile) -> Option<String> {
+    let (common, residual) = (file.common?, file.residual?);
+    (residual.rms_px > AGREE_PX).then(|| {
+        format!(
+            "the {common} differ by {} px RMS, too much for dense stereo (up to {AGREE_PX}): the pictures are of another rig, it changed, or its \
+             calibration is poor",
+            number(Some(residual.rms_px), 2)
+        )
+    })
+}
+
 /// The lines on stdout.
 pub fn summary(file: &RectifiedFile, out: &OutDir) -> String {
     let skipped = match file.pairs_skipped.len() {
@@ -56,7 +71,13 @@ fn agreement(file: &RectifiedFile) -> Option<String> {
 }
 
 /// The report. `rectified` are the pictures written, `shown` the corners of the pair that agrees worst.
-pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCorners>) -> Result<String> {
+/// `doubts` is what speaks against the rig or the rows.
+pub fn page(
+    file: &RectifiedFile,
+    rectified: &[PairFiles],
+    shown: Option<&PairCorners>,
+    doubts: &[String],
+) -> Result<String> {
     let name = shown.map(|pair| pair.pair.clone()).or_else(|| rectified.first().map(|p| p.pair.clone()));
     let files = name.as_ref().and_then(|name| rectified.iter().find(|files| files.pair == *name));
     let none = PairCorners::default();
@@ -64,9 +85,15 @@ pub fn page(file: &RectifiedFile, rectified: &[PairFiles], shown: Option<&PairCo
     let rectify = file.mode == "rectify";
     let content = html! {
         @if let Some(text) = agreement(file) {
-            @let tone = if file.residual.is_some() { Tone::Good } else { Tone::Doubtful };
-            (page::verdict(tone, if file.residual.is_some() { "Rectified" } else { "Not checked" }, &numbers(file), &format!("{text}.")))
+            @let (tone, headline) = match (&file.residual, doubts.is_empty()) {
+                (None, _) => (Tone::Doubtful, "Not checked"),
+                _ if doubt(file).is_some() => (Tone::Bad, "The rows do not agree"),
+                (_, false) => (Tone::Doubtful, "Rectified by a doubtful rig"),
+                (_, true) => (Tone::Good, "Rectified"),
+            };
+            (page::verdict(tone, headline, &numbers(file), &format!("{text}.")))
         }
+        (page::warnings(doubts))
         @if let (Some(jpeg), Some(name)) = (&drawn, &name) {
             h2 { (if rectify { "Epipolar lines" } else { "A pair" }) }
             (page::figure(&lined(jpeg, file.common), &caption(name, file)))

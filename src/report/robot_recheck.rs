@@ -27,7 +27,9 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
         return "the robot was identified from these poses, which say nothing of what happened since".to_owned();
     }
     let tolerance = mm(tolerance_mm);
-    let statement = recheck.statement();
+    let far_within =
+        if recheck.changed && standing == Standing::StillValid { "far within the tolerance: " } else { "" };
+    let statement = format!("{far_within}{}", recheck.statement());
     let of_rest = match recheck.cause().is_empty() {
         true => format!(
             "{statement}; {} poses would have shown a single cause that moves the target by {} mm, tolerance {tolerance} mm",

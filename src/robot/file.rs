@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
-use crate::diagnostic::Place;
+use crate::diagnostic::{Place, Status};
 use crate::files;
 
 /// What is `None` does not stand in the file.
@@ -351,12 +351,17 @@ pub struct Check {
     pub reason: String,
 }
 
-impl Check {
-    /// Whether what is made of the robot is advised against.
-    pub fn is_against(&self) -> bool {
-        self.advice == Advice::DoNotUse
+impl Advice {
+    /// What a command that found or uses such a robot ends with, at best: one that is to be checked first is a result.
+    pub fn status(self) -> Status {
+        match self {
+            Advice::Use | Advice::Check | Advice::KeepNominal => Status::Done,
+            Advice::DoNotUse => Status::OutOfTolerance,
+        }
     }
+}
 
+impl Check {
     /// What a user of `file` must know; `None` where there is nothing to say.
     pub fn warning(&self, file: &Utf8Path) -> Option<String> {
         let reason = &self.reason;

@@ -12,7 +12,7 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use super::foreign;
 use super::numbers::Style;
-use crate::files::{Error, Result};
+use crate::files::{Error, Result, unreadable};
 
 /// The longest table that is read, bytes.
 const MOST_BYTES: u64 = 2 << 30;
@@ -54,7 +54,7 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             return Err(Error::Missing { what, path: file, hint: Some(hint.to_owned()) });
         }
-        Err(source) => return Err(Error::Io { action: "read", path: file, source }),
+        Err(source) => return Err(unreadable(&file, what, source)),
     }
     if bytes.starts_with(b"PK\x03\x04") || bytes.starts_with(&[0xd0, 0xcf, 0x11, 0xe0]) {
         return cells(bytes, &file, sheet.as_deref());

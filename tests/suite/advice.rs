@@ -100,6 +100,34 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
 }
 
 #[test]
+fn a_run_that_fails_says_that_the_results_beside_it_are_older() {
+    let folder = identified("robot.toml");
+    let at = folder.path();
+    let failed = |out: &str| {
+        let output =
+            stereocal(at, &["identify", "--measurements", "nowhere.csv", "--robot", "robot.toml", "--out", out]);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        stderr(&output)
+    };
+    // Without provenance the result has no date.
+    assert!(!failed("out").contains("earlier run"));
+    let again = ["--measurements", "truth/measurements.csv", "--method", "trust-region", "--extensions", "none"];
+    let done = stereocal(at, &[&["identify", "--robot", "robot.toml"], &again[..]].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+    assert!(!stderr(&done).contains("earlier run"));
+    let date = serde_json::from_str::<serde_json::Value>(
+        &std::fs::read_to_string(at.join("out/identification.json")).unwrap(),
+    )
+    .unwrap()["provenance"]["date"]
+        .as_str()
+        .unwrap()
+        .to_owned();
+    let note = format!("note: out/identification.json and what stands beside it are of an earlier run ({date})\n");
+    assert!(failed("out").ends_with(&note), "{}", failed("out"));
+    assert!(!failed("new").contains("earlier run"));
+}
+
+#[test]
 fn a_robot_of_another_arms_file_carries_that_it_is_not_to_be_used() {
     let folder = identified("ur5e/robot.toml");
     let at = folder.path();

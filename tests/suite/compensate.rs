@@ -366,6 +366,22 @@ fn a_target_beyond_a_joints_range_is_named_so() {
         said.contains("p1 (line 3): joint 1 of the target is at 500.000; its range is -165.000 to 165.000"),
         "{said}"
     );
+    // Of a program each reason is said once, by the motion.
+    let motion = |q: &[f64]| {
+        let q: Vec<String> = radians(q).iter().map(f64::to_string).collect();
+        format!("movej([{}])\n", q.join(","))
+    };
+    for (motions, counts) in [
+        (vec![&list[1]], "no motion is corrected: the program is left as written"),
+        (vec![&list[0], &list[1]], "1 of 2 motions move to them; 1 left as written"),
+    ] {
+        let program: String = motions.iter().map(|q| motion(q)).collect();
+        std::fs::write(folder.path().join("p.script"), program).unwrap();
+        let said = run(folder.path(), &["p.script", "--out", "program", "--force"], 1);
+        assert_eq!(said.matches("joint 1 of the target is at 500.000").count(), 1, "{said}");
+        assert!(said.contains(counts) && !said.contains("not compensated"), "{said}");
+        assert_eq!(said.contains("without it the real tool"), motions.len() == 2, "{said}");
+    }
 }
 
 #[test]

@@ -203,7 +203,7 @@ fn a_check_says_what_it_judged_and_by_what() {
     assert!(said.contains("second board: 8 pairs, largest error 0.0") && !said.contains("with a ruler"), "{said}");
     // Five pairs are too few poses, and that has a plain name.
     let said = check(&["--corners", "five.csv"]);
-    assert!(said.contains("no length can be trusted until these checks are passed: "), "{said}");
+    assert!(said.contains("what lengths can be trusted to is not known until these checks are passed: "), "{said}");
     assert!(said.contains("number of different poses"), "{said}");
     // Corners that scatter by five px: what may be off by more than a tenth of itself is no length to trust.
     let mut state = 7u64;
@@ -284,7 +284,7 @@ fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
         ["camera-check", "mixed", "--intrinsics", "before/calibration.json", "--out", "mostly", "--tolerance-mm", "1"];
     let mostly = stereocal(at, &known);
     assert!(
-        stderr(&mostly).contains("calibrated from 1 of these pairs (of 5), which count twice"),
+        stderr(&mostly).contains("calibrated from 1 of these pairs (of 5), which count twice: the uncertainty that is stated is a little too small"),
         "{}",
         stderr(&mostly)
     );

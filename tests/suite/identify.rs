@@ -75,6 +75,14 @@ fn shared(name: &str) -> Option<PathBuf> {
     Some(folder)
 }
 
+/// What a run has written that found a robot, whatever it advises.
+fn identified_with(output: &std::process::Output) -> serde_json::Value {
+    let record: serde_json::Value = serde_json::from_slice(&output.stdout).expect("stdout is JSON");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(i32::from(record["advice"] == "do-not-use")), "{said}");
+    record
+}
+
 fn record(data: &Path, arguments: &[&str]) -> serde_json::Value {
     let out = tempfile::tempdir().expect("a folder");
     let output = Command::cargo_bin("stereocal")
@@ -88,8 +96,7 @@ fn record(data: &Path, arguments: &[&str]) -> serde_json::Value {
         .args(arguments)
         .output()
         .expect("it runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("stdout is JSON")
+    identified_with(&output)
 }
 
 fn mean(quality: &serde_json::Value) -> f64 {
@@ -145,8 +152,7 @@ fn identified(folder: &Path, change: impl Fn(usize, Vec<String>) -> Vec<String>)
         .args(["--robot", "robot.toml", "--method", "trust-region", "--json", "--out", "out", "--force"])
         .output()
         .expect("it runs");
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).expect("stdout is JSON")
+    identified_with(&output)
 }
 
 /// That `verify` says of the nominal and the written robot what `identify` said.

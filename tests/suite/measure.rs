@@ -46,6 +46,20 @@ fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
     let rows = found.pointer("/shared/poses/0/sensitivity").and_then(Value::as_array).unwrap();
     assert!(rows.len() == 6 && rows.iter().all(|row| row.as_array().unwrap().len() == parameters));
     assert!(column(&world.join("out/measurements.csv"), "status").iter().all(|s| s == "ok"));
+    let page = |out: &str| std::fs::read_to_string(world.join(out).join("measure.html")).unwrap();
+    assert!(page("out").contains("<div class=\"verdict good\">"));
+
+    // A rig that did not pass, and one of which no length can be trusted.
+    for trusted_mm in [serde_json::json!(0.2), Value::Null] {
+        let mut rig = json(&world.join("out/calibration.json"));
+        rig["check"] = serde_json::json!({"verdict": "fail", "tolerance_mm": 0.05, "trusted_mm": trusted_mm});
+        std::fs::write(world.join("doubted.json"), rig.to_string()).unwrap();
+        let doubted =
+            stereocal(world, &["measure", "poses/", "--calibration", "doubted.json", "--out", "doubted", "--force"]);
+        assert_eq!(doubted.status.code(), Some(0), "{}", stderr(&doubted));
+        assert!(page("doubted").contains("<div class=\"verdict doubtful\">"));
+        assert!(page("doubted").contains("this rig did not pass its check (FAIL at a tolerance of 0.05 mm)"));
+    }
 
     let large = stereocal(
         world,

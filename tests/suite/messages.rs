@@ -78,7 +78,7 @@ fn settings_that_are_none() {
     refused(&["identify"], &toml, 2, &["tolerance_mm is 0", "target_board.square_mm is -1"]);
     refused(&["identify", "--config", "none.toml"], &[], 2, &["not found", "none.toml"]);
     let unknown = [("stereocal.toml", "\ntolerance = 1.0\n")];
-    refused(&["identify"], &unknown, 2, &["unknown field `tolerance`", "stereocal.toml:2"]);
+    refused(&["identify"], &unknown, 2, &["unknown key `tolerance`", "stereocal.toml:2"]);
 }
 
 /// Every number that can be set has a range, and the message says it.
@@ -267,7 +267,7 @@ fn settings_as_init_writes_them_can_be_changed_line_by_line() {
         &["identify"],
         &[("stereocal.toml", "squares = \"9x7\"\n# [check_board]\n")],
         2,
-        &["unknown field `squares`", "below `[check_board]`"],
+        &["unknown key `squares`", "below `[check_board]`"],
     );
     let twice = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 10.0\nsquare_mm = 20.0\n";
     refused(&["identify"], &[("stereocal.toml", twice)], 2, &["duplicate key", "square_mm", "stereocal.toml:4"]);

@@ -136,6 +136,9 @@ fn plans_that_nobody_can_run_are_refused() {
     assert!(said.contains("are in view and can be reached") && !said.contains("fewer poses"), "{said}");
     let here = ["--poses", "10", "--verify", "3", "--calibration", "out/calibration.json", "--out", "here"];
     let said = run(at, &[&here[..], &QUICK[..]].concat(), 0);
+    // Either the paper's plan has its column, or it is said why not.
+    let left_out = said.contains("the paper's plan is left out: this robot does not reach its poses");
+    assert!(said.contains("the paper's, mm") != left_out, "{said}");
     assert!(said.contains("report: here/plan.html") && said.contains("programs: here/programs"), "{said}");
     let text = std::fs::read_to_string(at.join("robot.toml")).unwrap();
     let lines = text.lines().map(|l| if l.starts_with("limits_deg") { "limits_deg = [-1.0, 1.0]" } else { l });

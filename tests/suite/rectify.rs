@@ -97,7 +97,25 @@ fn corresponding_corners_stand_on_one_row() {
     turned["right_from_left"]["rotation"] = rotation.into();
     turned.as_object_mut().unwrap().remove("covariance");
     std::fs::write(folder.path().join("turned.json"), turned.to_string()).unwrap();
-    done(folder.path(), &["rectify", "check", "--calibration", "turned.json", "--out", "turned"]);
+    let turned = ["rectify", "check", "--calibration", "turned.json", "--out", "turned"];
+    let turned = stereocal(folder.path(), &turned);
+    assert_eq!(turned.status.code(), Some(1), "{}", stderr(&turned));
+    assert!(stderr(&turned).contains("too much for dense stereo"), "{}", stderr(&turned));
+    let page = |out: &str| std::fs::read_to_string(folder.path().join(out).join("rectify.html")).unwrap();
+    assert!(page("turned").contains("<div class=\"verdict bad\"><strong>The rows do not agree"));
+    // The true rig, with and without a check that it did not pass.
+    let mut doubted: Value = json(&folder.path().join("truth/calibration.json"));
+    doubted["check"] = serde_json::json!({"verdict": "undecided", "tolerance_mm": 0.05, "trusted_mm": 0.2});
+    std::fs::write(folder.path().join("doubted.json"), doubted.to_string()).unwrap();
+    done(folder.path(), &["rectify", "check", "--calibration", "doubted.json", "--out", "doubted"]);
+    assert!(page("doubted").contains("<div class=\"verdict doubtful\"><strong>Rectified by a doubtful rig"));
+    doubted["check"].as_object_mut().unwrap().remove("trusted_mm");
+    std::fs::write(folder.path().join("doubted.json"), doubted.to_string()).unwrap();
+    let untrusted =
+        stereocal(folder.path(), &["export", "calibration", "--format", "ros", "--calibration", "doubted.json"]);
+    assert!(untrusted.status.code() == Some(0) && stderr(&untrusted).contains("no length can be trusted"));
+    done(folder.path(), &["rectify", "check", "--calibration", "truth/calibration.json", "--out", "clean"]);
+    assert!(page("clean").contains("<div class=\"verdict good\"><strong>Rectified<"));
     let rms = number(&json(&folder.path().join("turned/rectified.json")), "/residual/rms_px");
     assert!(rms > 20.0 * ROWS_PX, "{rms}");
 }
@@ -117,7 +135,9 @@ fn depth_colour_and_names_stay_and_other_sizes_are_refused() {
         picture.save(path.join(name)).unwrap();
     }
     for (more, out) in [(&["--undistort-only"][..], "straight"), (&["--alpha", "1"], "turned")] {
-        done(path, &[&["rectify", "mixed", "--out", out], &TRUTH[..], more].concat());
+        // One picture for both sides: its rows do not agree, which is said where rows are common.
+        let mixed = stereocal(path, &[&["rectify", "mixed", "--out", out], &TRUTH[..], more].concat());
+        assert_eq!(mixed.status.code(), Some(i32::from(out == "turned")), "{}", stderr(&mixed));
         let left = image::open(path.join(out).join("rectified/left/left01.png")).unwrap();
         let right = image::open(path.join(out).join("rectified/right/right01.png")).unwrap();
         assert_eq!(left.color(), image::ColorType::L16);
@@ -150,7 +170,8 @@ fn depth_colour_and_names_stay_and_other_sizes_are_refused() {
         raw.save(path.join("check").join(side).join("whole.png")).unwrap();
     }
     std::fs::remove_file(path.join("check/right").join(first(path))).unwrap();
-    done(path, &["rectify", "check", "--calibration", "truth/calibration.json", "--out", "cut"]);
+    // The pair that is left is one picture for both sides.
+    assert_eq!(rectify(path, &["--out", "cut"]).status.code(), Some(1));
     let cut = json(&path.join("cut/rectified.json"));
     assert_eq!(cut["pairs"].as_array().unwrap().len(), 1);
     assert_eq!(cut["pairs_skipped"].as_array().unwrap().len(), 5);

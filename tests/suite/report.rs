@@ -88,6 +88,8 @@ fn one_page_of_the_day() {
     );
     done(world, &["camera-check", "check/", "--tolerance-mm", "0.5"]);
     done(world, &["measure", "poses/"]);
+    // Covariances of so few poses are a doubt, which is not the matter here.
+    std::fs::write(world.join("stereocal.toml"), "[identify]\nexamine = false\n").unwrap();
     done(world, &["identify", "--method", "trust-region"]);
     let said = done(world, &["report"]);
     assert!(said.starts_with("rig: PASS") && said.contains("before,"), "{said}");
@@ -106,6 +108,17 @@ fn one_page_of_the_day() {
         assert!(page.contains(part), "{part}");
     }
     what_is_judged_adds_up(world, &page);
+
+    // A robot that is to be checked before use is no clean day.
+    let path = world.join("out/identification.json");
+    let clean = std::fs::read_to_string(&path).unwrap();
+    let mut robot: serde_json::Value = serde_json::from_str(&clean).unwrap();
+    (robot["advice"], robot["reason"]) = ("check".into(), "the floor shook".into());
+    std::fs::write(&path, robot.to_string()).unwrap();
+    let output = stereocal(world, &["report"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(stdout(&output).contains("check before you use the identified robot: the floor shook"));
+    std::fs::write(&path, clean).unwrap();
 
     // The same measurements with another calibration beside them.
     done(world, &["camera-check", "check/", "--tolerance-mm", "0.5", "--lens", "brown5"]);

@@ -107,11 +107,13 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
             0 => "no instruction in this file moves to them: whether each use of them is a motion is not known\n"
                 .to_owned(),
             1 if through == 1 => "the one motion to them is compensated\n".to_owned(),
+            _ if through == 0 => "no motion is corrected: the program is left as written\n".to_owned(),
             all if all == through => format!("all {all} motions move to them\n"),
             all => format!("{through} of {all} motions move to them; {} left as written\n", all - through),
         };
     }
-    if let (Some(mean), Some(max), None) = (summary.before_mean_mm, summary.before_max_mm, &pair.same) {
+    let is_corrected = pair.same.is_none() && summary.compensated > 0;
+    if let (Some(mean), Some(max), true) = (summary.before_mean_mm, summary.before_max_mm, is_corrected) {
         text += &format!(
             "without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most (in the base frame; the errors of `identify` are \
              those after a rigid fit of each placement)\n"
@@ -122,8 +124,15 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
         Some(motions) => motions.iter().filter(|m| m.moves_by.is_err()).map(|m| format!("left: {m}")).collect(),
         None => Vec::new(),
     };
-    let refused = |r: &Refused| format!("not compensated: {} (line {}): {}", r.name, r.line, r.reason);
-    listed(&mut text, summary.refused.iter().map(refused), summary.refused.len(), "compensated.csv");
+    // Of a program's target the motion to it says why.
+    let is_said = |r: &&Refused| left.iter().any(|motion| motion.ends_with(&r.reason));
+    let refused: Vec<&Refused> = summary.refused.iter().filter(|r| !is_said(r)).collect();
+    let named = |r: &Refused| match r.name == format!("line {}", r.line) {
+        true => r.name.clone(),
+        false => format!("{} (line {})", r.name, r.line),
+    };
+    let lines = refused.iter().map(|r| format!("not compensated: {}: {}", named(r), r.reason));
+    listed(&mut text, lines, refused.len(), "compensated.csv");
     let of_motions = left.len();
     listed(&mut text, left.into_iter(), of_motions, "compensate.json");
     text

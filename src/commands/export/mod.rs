@@ -3,6 +3,7 @@
 mod placement;
 mod robot;
 
+use super::heed::heed_rig;
 use super::{Outcome, Result};
 use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
 use crate::config::Config;
@@ -11,7 +12,6 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration as rig;
 use crate::formats::export;
-use crate::progress;
 
 /// Runs the command.
 pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
@@ -27,7 +27,7 @@ fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Ou
     let named = args.calibration.clone().unwrap_or_else(|| out.or_usual(rig::OWN_NAME, &config.out));
     let rig_file = rig::file(Some(&named), &out)?;
     let calibrated = rig::read(&rig_file)?;
-    calibrated.doubts().into_iter().for_each(progress::warn);
+    heed_rig(&calibrated);
     let rig = calibrated.rig;
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&rig_file]);
     let files = match args.format {

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::heed::heed_rig;
 use super::{Outcome, Result};
 use crate::cli::Measure;
 use crate::config::Config;
@@ -33,7 +34,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
-    let known = knowledge(args, config, &rig_file)?;
+    let (known, doubts) = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;
     if args.watch {
         let wanted = Wanted {
@@ -70,7 +71,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
         },
     );
     let json = json?;
-    let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances })?;
+    let page = report::measure::page(&series, &file, &known, &Extras { thumbnails, distances, doubts })?;
     let names = corners.pairs.iter().map(|pair| pair.pair.as_str());
     let page = if args.draw { report::page::with_overlays(page, names) } else { page };
     report::page::write(&out, "measure.html", page)?;
@@ -88,11 +89,11 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
     lists.find(|list| list.is_file()).unwrap_or(first)
 }
 
-/// The rig, the target and what is known of both.
-fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Knowledge> {
+/// The rig, the target and what is known of both; what is said against the rig.
+fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Knowledge, Vec<String>)> {
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let calibrated = calibration::read(rig_file)?;
-    calibrated.doubts().into_iter().for_each(progress::warn);
+    let doubts = heed_rig(&calibrated);
     let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(
@@ -105,7 +106,8 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<Kno
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    Ok(Knowledge { rig, noise, pair_excess, farthest_pair, volume, board, crossing_mm, tolerance_mm })
+    let known = Knowledge { rig, noise, pair_excess, farthest_pair, volume, board, crossing_mm, tolerance_mm };
+    Ok((known, doubts))
 }
 
 /// Every pose of the list with its corners, or why there are none.

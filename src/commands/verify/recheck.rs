@@ -25,7 +25,7 @@ use crate::measurements::{Measurement, Observed, Role};
 use crate::progress;
 use crate::report;
 use crate::report::robot_recheck::Judged;
-use crate::robot::{self, Robot};
+use crate::robot::{self, Advice, Robot};
 
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let (robot, check) = robot::file::read_checked(against)?;
@@ -76,7 +76,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         seen_mm: found.seen_mm,
         length_mm: None,
     });
-    let advised_against = check.is_some_and(|check| check.is_against());
+    let advised_against = check.is_some_and(|check| check.advice == Advice::DoNotUse);
     let judged = Judged { standing: content.standing, tolerance_mm, advised_against };
     let page = report::robot_recheck::page(&found, judged, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;

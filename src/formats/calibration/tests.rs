@@ -81,13 +81,13 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
         file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });
         file.unconfirmed = unconfirmed.iter().map(|pair| (*pair).to_owned()).collect();
         std::fs::write(&path, files::to_json(&file)).unwrap();
-        read(&path).unwrap().doubts().join("; ")
+        let read = read(&path).unwrap();
+        read.doubts().join("; ")
     };
     assert_eq!(doubts(None, &[]), "");
     assert_eq!(doubts(Some((Verdict::Pass, Some(0.0123))), &[]), "");
-    let failed = doubts(Some((Verdict::Fail, Some(1.3538))), &[]);
     assert_eq!(
-        failed,
+        doubts(Some((Verdict::Fail, Some(1.3538))), &[]),
         "this rig did not pass its check (FAIL at a tolerance of 0.05 mm): lengths can be trusted to 1.4 mm"
     );
     let open = doubts(Some((Verdict::Undecided, None)), &["0017"]);

@@ -120,7 +120,10 @@ impl Urdf {
         let links = root.children().filter(|n| n.has_tag_name("link")).filter_map(|n| n.attribute("name"));
         let roots: Vec<&str> = links.filter(|link| !joints.iter().any(|j| j.child == *link)).collect();
         let [root_link] = roots[..] else {
-            let message = format!("a robot has one root link; this one has {}: {}", roots.len(), roots.join(", "));
+            let message = match roots[..] {
+                [] => "no link that nothing moves: a robot has one, its base".to_owned(),
+                _ => format!("a robot has one root link; this one has {}: {}", roots.len(), roots.join(", ")),
+            };
             return Err(refuse(None, message, None));
         };
         let name = root.attribute("name").unwrap_or("robot").to_owned();

@@ -64,7 +64,7 @@ impl Record {
         };
         self.warnings = sentences(&findings.against);
         self.warnings.extend(worse);
-        self.warnings.extend(kept);
+        self.warnings.extend(kept.filter(|_| self.advice != Advice::DoNotUse));
         self.warnings.extend(doubts);
         self.warnings.extend(sentences(&findings.notes));
         self.warnings.extend(self.zero_of_readings(found));

@@ -48,7 +48,7 @@ pub(super) fn decoded(bytes: &[u8], path: &Utf8Path) -> Result<DynamicImage, Str
 fn other(bytes: &[u8], format: Option<ImageFormat>) -> Result<DynamicImage, String> {
     let format = format.ok_or_else(|| undecodable("neither PNG, TIFF, BMP, JPEG nor PGM"))?;
     let reader = ImageReader::with_format(std::io::Cursor::new(bytes), format);
-    DynamicImage::from_decoder(limits::decoder(reader)?).map_err(undecodable)
+    DynamicImage::from_decoder(limits::decoder(reader)?).map_err(limits::given_up)
 }
 
 /// Decodes a JPEG by the letter: the decoder of the `image` crate, told not to fill in what is missing.

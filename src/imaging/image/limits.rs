@@ -69,7 +69,7 @@ pub(super) fn decoder<'a, R: BufRead + Seek + 'a>(
 ) -> Result<impl ImageDecoder + 'a, String> {
     // Sizes are checked by `check`, with a reason that says what was found.
     reader.limits(Limits::no_limits());
-    let decoder = reader.into_decoder().map_err(undecodable)?;
+    let decoder = reader.into_decoder().map_err(given_up)?;
     check(decoder.dimensions(), decoder.total_bytes())?;
     Ok(decoder)
 }
@@ -81,6 +81,15 @@ fn unreadable(e: std::io::Error) -> String {
 /// The reason for a file that is no picture.
 pub(super) fn undecodable(why: impl std::fmt::Display) -> String {
     format!("{UNDECODABLE}: {why}")
+}
+
+/// Why a decoder gave up, not in its own words, which are about its code.
+pub(super) fn given_up(error: image::ImageError) -> String {
+    undecodable(match error {
+        image::ImageError::IoError(_) => "the file ends early",
+        image::ImageError::Unsupported(_) => "its format has kinds that are not read, and this is one",
+        _ => "damaged, or of another format than its name says",
+    })
 }
 
 /// Checks what is about to be decoded.

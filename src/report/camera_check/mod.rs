@@ -39,14 +39,21 @@ fn happened(judged: &Judged) -> Vec<String> {
     judged.facts.findings.iter().map(|finding| finding.action.clone()).collect()
 }
 
-/// Warnings with their reasons, but for those whose reason stands in the table of evidence.
+/// Warnings with their reasons, but for those that stand in the table of checks.
 fn warnings(judged: &Judged) -> Vec<String> {
-    let line = |warning: &Warning| judged.evidence.iter().find(|line| line.detail == warning.reason);
-    let said = |warning: &Warning| match line(warning) {
-        Some(line) => format!("{}: {}; {}", line.name(), line.short_figure(), line.remedy),
-        None => warning.whole(),
+    let is_new = |warning: &&Warning| judged.evidence.iter().all(|line| line.detail != warning.reason);
+    // Of what stands among the things to do only the reason is new.
+    let next = summary::next(judged);
+    let said = |warning: &Warning| match next.contains(&warning.text.as_str()) {
+        true => warning.reason.clone(),
+        false => warning.whole(),
     };
-    judged.warnings.iter().map(said).collect()
+    judged.warnings.iter().filter(is_new).map(said).filter(|said| !said.is_empty()).collect()
+}
+
+/// What the terminal says of the page, said on it.
+fn on_this_page(said: &str) -> String {
+    said.replace(" in camera-check.html", " below")
 }
 
 /// The report, with pictures of some pairs.
@@ -56,14 +63,15 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
         Verdict::Undecided => Tone::Doubtful,
         Verdict::Fail => Tone::Bad,
     };
-    let next: Vec<String> = summary::next(judged).into_iter().map(str::to_owned).collect();
+    let next: Vec<String> = summary::next(judged).into_iter().map(on_this_page).collect();
+    let warnings = warnings(judged);
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
         @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
         (ledger(judged))
         @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
-        @if !judged.warnings.is_empty() { p { "What else to know:" } }
-        (page::warnings(&warnings(judged)))
+        @if !warnings.is_empty() { p { "What else to know:" } }
+        (page::warnings(&warnings))
         (scale(judged))
         h2 { "Lengths on held-out pairs" }
         (lengths(judged)?)
@@ -127,20 +135,26 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
 
 /// The checks that are not passed; folded, all of them: what was looked at, what was found, up to where it allows a pass, what it means.
 fn ledger(judged: &Judged) -> Markup {
+    // What stands among the things to do is not said again.
+    let next = summary::next(judged);
+    let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&line.remedy) {
+        true => line.detail.clone(),
+        false => format!("{}. To do: {}", line.detail, on_this_page(line.remedy)),
+    };
     let below: Vec<&Evidence> = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).collect();
     html! {
         @if !below.is_empty() {
             h2 { "Checks that are not passed" }
-            (lines(&below))
+            (lines(&below, &with_remedy))
         }
         (page::details(
             &format!("All {} checks", judged.evidence.len()),
-            &html! { (lines(&judged.evidence.iter().collect::<Vec<_>>())) },
+            &lines(&judged.evidence.iter().collect::<Vec<_>>(), &|line| line.detail.clone()),
         ))
     }
 }
 
-fn lines(evidence: &[&Evidence]) -> Markup {
+fn lines(evidence: &[&Evidence], detail: &dyn Fn(&Evidence) -> String) -> Markup {
     let class = |verdict| match verdict {
         Verdict::Pass => "allows good",
         Verdict::Undecided => "allows doubtful",
@@ -156,7 +170,7 @@ fn lines(evidence: &[&Evidence]) -> Markup {
                 td { (cell(limit)) }
                 td { (line.unit) }
                 td { span class=(class(line.allows)) { (word(line.allows).to_lowercase()) } }
-                td.detail { (page::text(&line.detail)) }
+                td.detail { (page::text(&detail(line))) }
             } } }
         } }
     }

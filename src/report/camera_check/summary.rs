@@ -286,7 +286,10 @@ pub(super) fn trusted(judged: &Judged) -> String {
             let open: Vec<&str> = open.filter(|line| line.allows != Verdict::Pass).map(Evidence::name).collect();
             match open.is_empty() {
                 true => "no length can be trusted: these pairs do not bound their errors".to_owned(),
-                false => format!("no length can be trusted until these checks are passed: {}", open.join(", ")),
+                false => format!(
+                    "what lengths can be trusted to is not known until these checks are passed: {}",
+                    open.join(", ")
+                ),
             }
         }
     }

@@ -104,21 +104,20 @@ fn verdict(record: &Record) -> Markup {
     };
     let (before, after) = (record.before.judged(), record.chosen_method().map(|m| m.quality.judged()));
     let what = if before.point.is_some() { "position" } else { "distance" };
-    let mut numbers = vec![
-        (format!("{} mm", mean(Some(before))), format!("mean {what} error before")),
-        (format!("{} mm", mean(after)), format!("mean {what} error after")),
-    ];
+    let after = after.filter(|_| screen::is_corrected(record));
+    let mut numbers = vec![(format!("{} mm", mean(Some(before))), format!("mean {what} error before"))];
+    numbers.extend(after.map(|after| (format!("{} mm", mean(Some(after))), format!("mean {what} error after"))));
     if let Some(expected) = &record.expected {
         let p95 = format!("{} mm", two_digits(expected.p95_mm));
         numbers.push((p95, "95 of 100 positions are better than this".to_owned()));
     }
-    let after = after.map_or_else(|| "n/a".to_owned(), |after| screen::errors(after, two_digits));
+    let after = after.map_or(String::new(), |after| format!(" After: {}.", screen::errors(after, two_digits)));
     let reason = record.whole_reason();
     let reason = if reason.is_empty() { String::new() } else { format!("{}. ", page::capital(reason)) };
     let detail = format!(
-        "{reason}Before: {}. After: {after}; {}.{}",
+        "{reason}Before: {}.{after} {}.{}",
         screen::errors(before, two_digits),
-        screen::judged_on(record),
+        page::capital(&screen::judged_on(record)),
         screen::of_tool(record).map_or_else(String::new, |said| format!(" {}.", page::capital(&said)))
     );
     page::verdict(tone, word, &numbers, &detail)

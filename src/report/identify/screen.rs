@@ -16,7 +16,7 @@ pub fn summary(record: &Record, robot: Option<&Utf8Path>, is_placed: bool, out: 
     let before = record.before.judged();
     let after = record.chosen_method().map(|m| m.quality.judged());
     let mut lines = vec![advice(record), format!("before: {}", errors(before))];
-    if record.advice != Advice::KeepNominal {
+    if is_corrected(record) {
         lines.push(format!("after: {}; {}", after.map_or_else(|| "n/a".to_owned(), errors), judged_on(record)));
     }
     if let Some(expected) = &record.expected {
@@ -35,6 +35,11 @@ pub fn summary(record: &Record, robot: Option<&Utf8Path>, is_placed: bool, out: 
     lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
     lines.push(format!("next: {}", next(record.advice, robot.map_or("ROBOT", Utf8Path::as_str), file.as_str())));
     lines.join("\n") + "\n"
+}
+
+/// Whether a robot other than the nominal one was kept.
+pub(super) fn is_corrected(record: &Record) -> bool {
+    !record.chosen.starts_with("nominal/")
 }
 
 /// Whether to use the robot, and why not.
@@ -60,7 +65,9 @@ fn next(advice: Advice, robot: &str, file: &str) -> String {
         Advice::KeepNominal => {
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
         }
-        Advice::DoNotUse => "mend what is named above, and identify again (`stereocal guide warnings`)".to_owned(),
+        Advice::DoNotUse => format!(
+            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the pendant"
+        ),
     }
 }
 

@@ -70,8 +70,11 @@ impl Evidence {
 
     fn in_one(&self, [value, limit]: [Option<String>; 2]) -> String {
         let unit = if self.unit.is_empty() { String::new() } else { format!(" {}", self.unit) };
+        // The words behind a unit are about the value alone: "0.04 mm apart (limit 3 mm)".
+        let of_limit = self.unit.split(' ').next().filter(|unit| !unit.is_empty());
+        let of_limit = of_limit.map_or(String::new(), |unit| format!(" {unit}"));
         match (value, limit) {
-            (Some(value), Some(limit)) => format!("{value}{unit} (limit {limit}{unit})"),
+            (Some(value), Some(limit)) => format!("{value}{unit} (limit {limit}{of_limit})"),
             (Some(value), None) => format!("{value}{unit}"),
             (None, _) => "not measurable".to_owned(),
         }

@@ -55,8 +55,9 @@ impl LensPairs {
     /// For a person.
     pub fn statement(&self) -> Option<String> {
         let LensPairs { same, of } = self;
+        let by = if self.are_many() { "" } else { "a little " };
         (*same > 0).then(|| {
-            format!("the lenses were calibrated from {same} of these pairs (of {of}), which count twice: the uncertainty that is stated is too small")
+            format!("the lenses were calibrated from {same} of these pairs (of {of}), which count twice: the uncertainty that is stated is {by}too small")
         })
     }
 }
