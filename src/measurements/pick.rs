@@ -60,13 +60,8 @@ pub(super) fn reading(parts: &[Part], at: &At, joint: &Joint, value: f64, angles
 /// Columns of lengths are no joints that turn.
 pub(super) fn check_lengths(parts: &[Part], picked: &Picked, robot: &Robot) -> Result<()> {
     for (number, (at, joint)) in picked.joints.iter().zip(&robot.joints).enumerate() {
-        if let Some(length) = unit(parts, at).filter(|u| !u.is_angle() && !joint.slides) {
-            let message = format!(
-                "{} is in {}, but joint {} of the robot turns",
-                listed(parts, &[*at]),
-                length.word(),
-                number + 1
-            );
+        if unit(parts, at).is_some_and(|u| !u.is_angle()) && !joint.slides {
+            let message = format!("{} is a length, but joint {} of the robot turns", listed(parts, &[*at]), number + 1);
             let hint =
                 "a joint that slides has `type = \"prismatic\"` in the robot's file; else name the column's unit";
             return Err(parts[at.part].refuse(message, Some(hint)));

@@ -4,10 +4,11 @@ use camino::Utf8Path;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use super::check::{Advice, Check};
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::ends::PoseRecord;
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
-use crate::diagnostic::{Place, Status};
+use crate::diagnostic::Place;
 use crate::files;
 
 /// What is `None` does not stand in the file.
@@ -325,50 +326,6 @@ impl From<&Robot> for RobotRecord {
             couplings: table(&robot.corrections.couplings, coupling),
             base: PoseRecord::of(&robot.ends.root_from_frame0),
             flange: PoseRecord::of(&robot.ends.last_frame_from_flange),
-        }
-    }
-}
-
-/// What to do with the robot that was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Advice {
-    Use,
-    /// Use it once the reason was looked at.
-    Check,
-    /// Nothing better than the nominal robot was found, and that is the result.
-    KeepNominal,
-    DoNotUse,
-}
-
-/// The advice with its reason, as files carry it to whatever uses the robot.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Check {
-    pub advice: Advice,
-    /// Why, in one sentence; empty where there is nothing to say.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub reason: String,
-}
-
-impl Advice {
-    /// What a command that found or uses such a robot ends with, at best: one that is to be checked first is a result.
-    pub fn status(self) -> Status {
-        match self {
-            Advice::Use | Advice::Check | Advice::KeepNominal => Status::Done,
-            Advice::DoNotUse => Status::OutOfTolerance,
-        }
-    }
-}
-
-impl Check {
-    /// What a user of `file` must know; `None` where there is nothing to say.
-    pub fn warning(&self, file: &Utf8Path) -> Option<String> {
-        let reason = &self.reason;
-        match self.advice {
-            Advice::DoNotUse => Some(format!("do not use {file}, says its own `check`: {reason}")),
-            Advice::Check => Some(format!("check before you use {file}, says its own `check`: {reason}")),
-            Advice::Use | Advice::KeepNominal => None,
         }
     }
 }

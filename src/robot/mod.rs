@@ -5,6 +5,7 @@ pub mod axes;
 pub mod bent;
 pub mod catalogue;
 pub mod chain;
+pub mod check;
 pub mod corrections;
 pub mod ends;
 pub mod file;
@@ -17,9 +18,9 @@ pub mod tool_fit;
 use crate::diagnostic::{Explain, Place};
 
 pub use chain::{Joint, Robot};
+pub use check::{Advice, Check};
 pub use corrections::Corrections;
 pub use ends::Ends;
-pub use file::{Advice, Check};
 pub use parameters::{Parameter, Unit};
 
 /// Result of reading a robot.

@@ -216,7 +216,7 @@ fn a_joint_that_slides_is_read_in_its_own_unit() {
         let file = folder.file("slides.csv", text(&header, &rows, ",", line));
         let (found, _) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{slide}: {}", report(&e)));
         same(&found, &rows, slide);
-        let what = format!("column 3 is in {slide}, but joint 3 of the robot turns");
+        let what = format!("q3 [{slide}] is a length, but joint 3 of the robot turns");
         refused(&source(&[&file]), &turning, &[&what, "prismatic"]);
     }
 }
