@@ -23,6 +23,10 @@ impl Fields {
         self.ends.len()
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
     /// One after the other.
     pub fn iter(&self) -> impl Iterator<Item = &str> {
         (0..self.len()).map(|column| &self[column])

@@ -219,10 +219,10 @@ impl Scan<'_> {
                 }
                 _ => {}
             }
-        } else if let Some((which, number)) = numbered::parameter(word) {
-            if let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2) {
-                self.numbered[which].entry(number).or_insert((self.line, v));
-            }
+        } else if let Some((which, number)) = numbered::parameter(word)
+            && let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2)
+        {
+            self.numbered[which].entry(number).or_insert((self.line, v));
         }
         self.other(word, value)?;
         if separator == '=' && self.depth == 0 {

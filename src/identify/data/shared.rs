@@ -98,8 +98,11 @@ pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
     [own, set.target_unknowns(false).to_vec()].concat()
 }
 
-/// Columns of the leading shared errors and own covariance, row by row.
-fn split(shared: &Shared, set: &Dataset) -> Option<(Vec<Matrix3xX<f64>>, Vec<Matrix3<f64>>)> {
+/// Columns of the leading shared errors, and own covariances, row by row.
+type Parts = (Vec<Matrix3xX<f64>>, Vec<Matrix3<f64>>);
+
+/// What a series' covariances are made of.
+fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
     let count = shared.covariance.len();
     if count == 0 || shared.covariance.iter().any(|row| row.len() != count) {
         return None;

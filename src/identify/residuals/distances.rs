@@ -24,13 +24,16 @@ pub struct Wire {
     pub offset: bool,
 }
 
-/// White derivatives of lengths in which the scatter enters so many times; `along` is a length as a vector, and how it moves.
+/// A length as a vector, and how it moves with the unknowns.
+type Along = (Vector3<f64>, Matrix3xX<f64>);
+
+/// White derivatives of lengths in which the scatter enters so many times.
 fn outer(
     lengths: &[Length],
     columns: usize,
     scatter: &Scatter,
     times: f64,
-    along: &dyn Fn(&Length) -> (Vector3<f64>, Matrix3xX<f64>),
+    along: &dyn Fn(&Length) -> Along,
 ) -> DMatrix<f64> {
     let mut jacobian = DMatrix::zeros(lengths.len(), columns);
     for (i, l) in lengths.iter().enumerate() {

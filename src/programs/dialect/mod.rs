@@ -9,14 +9,16 @@ mod yaskawa;
 use crate::programs::instruction::Instruction;
 use crate::programs::language::{Joints, Language, Motion, Stop, Target, Written, number};
 
+/// Files of a program that visits the stops, whose numbers may be pulses: name and text.
+type Program = fn(name: &str, stops: &[Written], motion: &Motion, pulses: bool) -> Vec<(String, String)>;
+
 /// What is known of a language.
 pub(super) struct Dialect {
     /// Every list of joint values, in the order of the text, as it stands there.
     pub targets: fn(text: &str, count: usize) -> Vec<Target>,
     /// Every instruction that moves the robot, in the order of the text.
     pub motions: fn(text: &str, targets: &[Target]) -> Vec<Instruction>,
-    /// Files of a program that visits the stops, whose numbers may be pulses: name and text.
-    program: fn(name: &str, stops: &[Written], motion: &Motion, pulses: bool) -> Vec<(String, String)>,
+    program: Program,
 }
 
 pub(super) fn of(language: Language) -> Dialect {
