@@ -27,7 +27,7 @@ pub fn groups(views: &[View], poses: &[Transform]) -> Vec<usize> {
     merge(&distances, |_, _, distance_mm| distance_mm < limit_mm, 1)
 }
 
-/// The fold of every pair, at most [`FOLDS`] of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
+/// The fold of every pair, at most `FOLDS` of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
 pub fn folds(views: &[View], poses: &[Transform]) -> Vec<usize> {
     let count = poses.len();
     let largest = 2 * count.div_ceil(FOLDS);
