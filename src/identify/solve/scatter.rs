@@ -208,8 +208,8 @@ fn hidden_mm2(residuals: &[Residual], left: f64, scatter: &Scatter) -> f64 {
         }
     }
     let (found, sd) = (scatter.point_mm.powi(2), information.sqrt().recip());
-    // Of a scatter that was found nothing is left over; of one that was not, less than nothing may be.
-    let most_probable = found + if scatter.point_mm > LEAST_MM { 0.0 } else { (score / information).min(0.0) };
+    // Where none was found, residuals that are smaller than the readings' noise ask for less than none.
+    let most_probable = if scatter.point_mm > LEAST_MM { found } else { (score / information).min(0.0) };
     let z = (most_probable / sd).max(FARTHEST);
     let Ok(law) = Normal::new(0.0, 1.0) else { return 0.0 };
     // The mean of a normal number that is known not to be negative.
