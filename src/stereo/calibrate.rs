@@ -142,10 +142,10 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// can be found over the series.
 pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
-    let Series { problem: start, discarded, runs, alone_px } = series::find(&candidates, runs)?;
+    let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let Choice { layout, near, priors, scatter, scores: lens_scores } =
-        lens_ladder::choose(&start, &corners.board, options).map_err(|e| e.without(&skipped))?;
+        lens_ladder::choose(&start, missed, &corners.board, options).map_err(|e| e.without(&skipped))?;
     let known = options.known.as_ref();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));
     let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
@@ -178,7 +178,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         inflation,
         priors,
         runs,
-        alone_px,
+        alone_px: missed.alone_px,
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),

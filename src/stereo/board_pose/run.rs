@@ -212,11 +212,8 @@ impl<'a> Run<'a> {
 
     /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.
     pub(super) fn consistent(&mut self) -> Option<Estimate<'a>> {
-        let mut last = None;
         for _ in 0..ROUNDS {
-            let bundle = self.bundle();
-            let values = self.values(&bundle);
-            let found = estimate(bundle, values, self.known.usual(), None)?;
+            let found = self.estimated()?;
             // The estimate does without poses of which too few corners fit.
             for (part, pose) in self.taking_part.iter_mut().zip(&found.values.poses) {
                 *part = *part && pose.is_some();
@@ -233,9 +230,15 @@ impl<'a> Run<'a> {
                 return Some(found);
             }
             strays.iter().for_each(|&i| self.taking_part[i] = false);
-            last = Some(found);
         }
-        last
+        self.estimated()
+    }
+
+    /// The bundle over the poses that take part now.
+    fn estimated(&self) -> Option<Estimate<'a>> {
+        let bundle = self.bundle();
+        let values = self.values(&bundle);
+        estimate(bundle, values, self.known.usual(), None)
     }
 
     /// No pose is measured.

@@ -17,11 +17,9 @@ use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::Cause;
+use crate::stereo::pairs::series::{Missed, TIMES};
 use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty;
-
-/// A lens or a rig that lacks something leaves no more than about this many times what single pictures do.
-const TIMES: f64 = 3.0;
 
 /// Pairs that are named as the worst.
 const WORST: usize = 5;
@@ -45,8 +43,8 @@ pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     if misfit.usual_px < TIMES * corner_sigma_px.unwrap_or(0.0) {
         return None;
     }
-    let is_shared = misfit.usual_px > TIMES * calibration.alone_px;
-    other_sides(calibration, &misfit).or_else(|| is_shared.then(|| not_simultaneous(calibration.alone_px, misfit)))
+    let missed = Missed { alone_px: calibration.alone_px, paired_px: misfit.usual_px };
+    other_sides(calibration, &misfit).or_else(|| missed.is_of_two_moments().then(|| not_simultaneous(calibration.alone_px, misfit)))
 }
 
 /// How far pairs miss their common rig.

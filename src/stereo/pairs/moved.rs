@@ -16,9 +16,7 @@ use crate::stereo::model::Shared;
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;
-
-/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment.
-const TIMES: f64 = 3.0;
+use crate::stereo::pairs::series::Missed;
 
 /// Shares that differ by no more than this part of them are of one board.
 const ONE_SIZE: f64 = 0.1;
@@ -39,7 +37,7 @@ struct Apart {
 pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) -> Vec<(Cause, String)> {
     let apart: Vec<Option<Apart>> = strays.iter().map(|&(i, px)| apart(series, i, px)).collect();
     let alone = series.alone_px.iter().flat_map(|side| side.iter().flatten().copied());
-    let others_moved = median(alone).is_some_and(|alone_px| usual_px > TIMES * alone_px)
+    let others_moved = median(alone).is_some_and(|alone_px| Missed { alone_px, paired_px: usual_px }.is_of_two_moments())
         || apart.iter().flatten().any(|apart| apart.larger.is_none());
     let baseline_mm = series.shared.rig.baseline_mm();
     let explained = |(k, &(_, missed_px)): (usize, &(usize, Option<f64>))| {

@@ -35,6 +35,26 @@ const FIRST_LENS: Lens = Lens::Brown5;
 /// own pictures, is the rig of none of them.
 const LARGEST_SHARE: f64 = 2e-3;
 
+/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment: a lens or a rig
+/// that lacks something leaves no more than about this.
+pub const TIMES: f64 = 3.0;
+
+/// How far pictures are usually missed, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// By each camera alone, the median over its own pictures.
+    pub alone_px: f64,
+    /// By the rig of all pairs, the median over them.
+    pub paired_px: f64,
+}
+
+impl Missed {
+    /// Whether the two pictures of the pairs were usually not taken at one moment.
+    pub fn is_of_two_moments(&self) -> bool {
+        self.paired_px > TIMES * self.alone_px
+    }
+}
+
 /// The pairs of a rig, near their common minimum.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
@@ -44,8 +64,8 @@ pub struct Series {
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,
-    /// What each camera leaves of its own pictures, the median over them, px.
-    pub alone_px: f64,
+    /// How far the pairs and their pictures are missed.
+    pub missed: Missed,
 }
 
 /// What a pair leaves on a rig: px, and its pose. `None` where it has none.
@@ -96,7 +116,7 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
     let (problem, runs) = (Problem { views, values, priors }, runs_kept.len());
-    Ok(Series { problem, discarded, runs, alone_px: alone_px_of(candidates) })
+    Ok(Series { problem, discarded, runs, missed: Missed { alone_px: alone_px_of(candidates), paired_px: usual_px } })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.

@@ -11,7 +11,8 @@
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
-use crate::stereo::select::known_lenses;
+use crate::stereo::pairs::series::Missed;
+use crate::stereo::select::{each_alone, known_lenses};
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
@@ -19,11 +20,23 @@ use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
-/// Chooses what is free, where it is not forced.
-pub fn choose(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
+/// Chooses what is free, where it is not forced. Of pictures that were not taken at one moment the lenses are those of each camera alone; which model,
+/// the pairs say, where they say anything.
+pub fn choose(start: &Problem, missed: Missed, board: &Board, options: &Options) -> Result<Choice, Error> {
     if let Some(known) = &options.known {
         return known_lenses::choose(start, board, known, options);
     }
+    let of_pairs = of_pairs(start, board, options);
+    if !missed.is_of_two_moments() {
+        return of_pairs;
+    }
+    let lens = of_pairs.as_ref().ok().and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
+    let Some(known) = each_alone::lenses(start, board, lens, missed) else { return of_pairs };
+    let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
+    Ok(Choice { scores, ..known_lenses::choose(start, board, &known, options)? })
+}
+
+fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         let layout = Layout::rig(lens, shape);
