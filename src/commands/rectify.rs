@@ -20,6 +20,7 @@ use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
 use crate::opencv::{Failure, Map, remap, undistort_rectify_map};
 use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
+use crate::stereo::volume::Volume;
 use crate::stereo::{self, Rig, Side};
 use crate::{progress, report};
 
@@ -35,7 +36,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
     let calibrated = calibration::read(&rig_file)?;
     let mut doubts = heed_rig(&calibrated);
-    let calibration::Calibrated { rig, board, .. } = calibrated;
+    let calibration::Calibrated { rig, board, volume, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
     let out = out.for_run(&run, &[source.places().as_slice(), &[&rig_file]].concat());
@@ -48,7 +49,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&written)?;
     out.check_free(&["rectified.json", "rectify.html"])?;
 
-    let (mut file, maps) = plan(args, &rig)?;
+    let (mut file, maps, lost) = plan(args, &rig, volume.as_ref())?;
     let bar = progress::bar("rectifying", pairing.pairs.len() as u64);
     let done: Vec<std::result::Result<(), String>> = (pairing.pairs.par_iter(), &headers, &names)
         .into_par_iter()
@@ -82,7 +83,8 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
-    let status = rows(&file);
+    let status = if lost.is_some() { Status::OutOfTolerance } else { rows(&file) };
+    doubts.extend(lost);
     let json = out.write_json("rectified.json", &file)?;
     doubts.extend(report::rectify::doubt(&file));
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
@@ -130,8 +132,8 @@ fn remapped(raw: &Raster, map: &Map) -> Result<Raster, Failure> {
     Ok(Raster { width, height, channels: raw.channels, samples })
 }
 
-/// What will be done to the pictures, and what is said of it.
-fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
+/// What will be done to the pictures, and what is said of it; last, that they will not show where the boards of the calibration stood.
+fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<(RectifiedFile, [Map; 2], Option<String>)> {
     let (width, height) = (rig.left.width, rig.left.height);
     let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
         let camera = rig.camera(side);
@@ -152,7 +154,7 @@ fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
     if args.undistort_only {
         let alone = |side: Side| map(side, &Matrix3::identity(), &rig.camera(side).matrix(), raw[side as usize]);
         let maps = [alone(Side::Left)?, alone(Side::Right)?];
-        return Ok((RectifiedFile::undistorted(rig, coverage(&maps)), maps));
+        return Ok((RectifiedFile::undistorted(rig, coverage(&maps)), maps, None));
     }
     let alpha = args.alpha.unwrap_or(Scaling::OPENCV.alpha);
     let scaling = Scaling { alpha, zero_disparity: args.zero_disparity };
@@ -175,7 +177,30 @@ fn plan(args: &Rectify, rig: &Rig) -> Result<(RectifiedFile, [Map; 2])> {
             100.0 * least
         ));
     }
-    Ok((RectifiedFile::rectified(rig, &matrices, scaling, coverage), maps))
+    let lost = volume.and_then(|volume| lost(volume, rig, &matrices));
+    lost.iter().for_each(progress::warn);
+    Ok((RectifiedFile::rectified(rig, &matrices, scaling, coverage), maps, lost))
+}
+
+/// That a rectified picture does not show the middle of where the boards stood: common rows look at right angles to the line between the cameras,
+/// and of cameras that look along it, or at one near place, that is elsewhere.
+fn lost(volume: &Volume, rig: &Rig, matrices: &Matrices) -> Option<String> {
+    let [low, high] = volume.bounding_box_mm(rig);
+    let middle_mm = 0.5 * (low + high);
+    let in_rectified = matrices.of(Side::Left).0 * middle_mm;
+    let is_shown = |side: Side| {
+        let at = matrices.of(side).1 * in_rectified.push(1.0);
+        let share = |px: f64, size: u32| (0.0..f64::from(size)).contains(&(px / at.z + 0.5));
+        at.z > 0.0 && share(at.x, rig.left.width) && share(at.y, rig.left.height)
+    };
+    let side = Side::BOTH.into_iter().find(|side| !is_shown(*side))?;
+    Some(format!(
+        "the rectified {} pictures do not show where the boards of the calibration stood ({:.0} mm away): cameras that look at one near place lose it \
+         from view on common rows. `--alpha 1` keeps all of the raw pictures, without `--zero-disparity` each is centred on what its camera sees; \
+         otherwise measure points in the raw pictures",
+        side.name(),
+        middle_mm.z
+    ))
 }
 
 /// Both pictures of a pair through the maps, as PNG; the reason where one cannot be read.

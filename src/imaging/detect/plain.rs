@@ -30,6 +30,9 @@ pub(super) enum Way {
     Grow,
     /// OpenCV's sector-based detector: slower, sees through more blur and noise.
     Sectors,
+    /// Corner by corner where each pixel is as dark as the darkest beside it: in overexposed pictures white bleeds into small dark squares, until
+    /// these no longer touch.
+    Darkened,
 }
 
 /// What was found so far.
@@ -48,7 +51,7 @@ impl Search {
         const ENOUGH_PX: f64 = 30.0;
         match way {
             // All of it was looked at corner by corner: more looking would only find a part of what is there.
-            Way::Sectors => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
+            Way::Sectors | Way::Darkened => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
             Way::Grow => {
                 let partial = self.partial.as_ref().map(|p| (&p.corners, p.level));
                 let known = [partial, self.seen.as_ref().map(|(grid, level)| (grid, *level))];
@@ -80,7 +83,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
             let complete = grid.count() == board.corner_count();
             // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
             let less = |(seen, _): &(Places, Level)| match way {
-                Way::Grow => tells(seen) > tells(&grid),
+                Way::Grow | Way::Darkened => tells(seen) > tells(&grid),
                 Way::Sectors => seen.count() > grid.count(),
             };
             if complete && search.seen.as_ref().is_some_and(less) {
@@ -152,6 +155,8 @@ fn found(small: &Grey8, (level, way): Attempt, board: Board, search: &mut Search
         let grid = Lattice { columns, rows, cells: corners.into_iter().map(Some).collect() };
         return Some(grid.clone()).filter(|_| extent::without_outline(small, grid).count() == board.corner_count());
     }
+    let darkened = (way == Way::Darkened).then(|| small.darkest_around());
+    let small = darkened.as_ref().unwrap_or(small);
     let grid = grown(small, board.corner_count())?;
     let fitting = fitting(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {
@@ -180,7 +185,7 @@ pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     let grown = [first, coarser].into_iter().chain(finer).map(|level| (level, Way::Grow));
     let side = |level: &Level| picture.width().min(picture.height()) as f64 / level.scale();
     let sectors = [first, coarser].into_iter().filter(|level| side(level) >= LEAST_FOR_SECTORS_PX as f64);
-    grown.chain(sectors.map(|level| (level, Way::Sectors))).collect()
+    grown.chain(sectors.map(|level| (level, Way::Sectors))).chain([(first, Way::Darkened)]).collect()
 }
 
 pub(super) fn grown(small: &Grey8, enough: usize) -> Option<Places> {
@@ -266,6 +271,27 @@ mod tests {
                 let place = (detected.level.to_picture(place).coords.add_scalar(0.5)) / side as f64;
                 let off = place.map(|v| (v - v.round()).abs() * side as f64);
                 assert!(off.max() <= level.scale(), "{side}: {col} {row} {place}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_board_is_found_whose_dark_squares_no_longer_touch() {
+        let board = Board::checker("8x6".parse().unwrap(), 10.0);
+        // White reaches into the dark squares by so many pixels on all sides.
+        for (side, bleeds) in [(14, 1), (16, 2), (30, 2)] {
+            let picture: Picture = Image::from_fn(24 * side, 20 * side, |x, y| {
+                let inside = |v: usize| (bleeds..side - bleeds).contains(&(v % side));
+                let (i, j) = (x / side, y / side);
+                let dark = (5..=12).contains(&i) && (5..=10).contains(&j) && (i + j) % 2 == 0;
+                if dark && inside(x) && inside(y) { 40 } else { 255u8 }
+            })
+            .into();
+            let found = detect(&picture, board).unwrap();
+            assert_eq!(found.corners.count(), 35, "{side} {bleeds}");
+            for (_, _, place) in found.corners.iter() {
+                let place = found.level.to_picture(place).coords.add_scalar(0.5) / side as f64;
+                assert!(place.map(|v| (v - v.round()).abs() * side as f64).max() < 1.5, "{place}");
             }
         }
     }

@@ -32,6 +32,19 @@ impl<T> Image<T> {
     }
 }
 
+impl Grey8 {
+    /// Each pixel as dark as the darkest of the 3 x 3 around it.
+    pub fn darkest_around(&self) -> Grey8 {
+        let of_three = |at: &dyn Fn(usize) -> u8, k: usize, end: usize| {
+            at(k.saturating_sub(1)).min(at(k)).min(at((k + 1).min(end - 1)))
+        };
+        let rows = Image::from_fn(self.width, self.height, |x, y| {
+            of_three(&|x| self.pixels[y * self.width + x], x, self.width)
+        });
+        Image::from_fn(self.width, self.height, |x, y| of_three(&|y| rows.pixels[y * self.width + x], y, self.height))
+    }
+}
+
 impl<T: Copy + Into<f64>> Image<T> {
     /// Mean of the 3 x 3 pixels at a place; `None` at the picture's border.
     pub fn mean_at(&self, at: Point2<f64>) -> Option<f64> {

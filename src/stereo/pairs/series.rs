@@ -39,6 +39,10 @@ const LARGEST_SHARE: f64 = 2e-3;
 /// that lacks something leaves no more than about this.
 pub const TIMES: f64 = 3.0;
 
+/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in the rig is twice that in
+/// one camera.
+const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
+
 /// How far pictures are usually missed, px.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
@@ -52,6 +56,11 @@ impl Missed {
     /// Whether the two pictures of the pairs were usually not taken at one moment.
     pub fn is_of_two_moments(&self) -> bool {
         self.paired_px > TIMES * self.alone_px
+    }
+
+    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
+    pub fn is_better_alone(&self) -> bool {
+        self.paired_px > HALF_IS_LOST * self.alone_px
     }
 }
 

@@ -20,14 +20,14 @@ use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
-/// Chooses what is free, where it is not forced. Of pictures that were not taken at one moment the lenses are those of each camera alone; which model,
-/// the pairs say, where they say anything.
+/// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose pictures were not taken at one
+/// moment, the lenses are expected to be those; which model, the pairs say, where they say anything.
 pub fn choose(start: &Problem, missed: Missed, board: &Board, options: &Options) -> Result<Choice, Error> {
     if let Some(known) = &options.known {
         return known_lenses::choose(start, board, known, options);
     }
     let of_pairs = of_pairs(start, board, options);
-    if !missed.is_of_two_moments() {
+    if !missed.is_better_alone() {
         return of_pairs;
     }
     let lens = of_pairs.as_ref().ok().and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);

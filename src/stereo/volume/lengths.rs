@@ -30,6 +30,9 @@ const PLACES: [usize; 3] = [7, 7, 5];
 /// Boards whose directions are taken, those that differ most; the others lie nearly as one of them.
 const BOARDS: usize = 8;
 
+/// Parts of a length that are looked for in a volume that is not deep enough for the whole.
+const PARTS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
+
 /// Directions of a box that is asked for: the axes of the left camera and halfway between each two of them.
 const DIRECTIONS: [[f64; 3]; 9] = [
     [1.0, 0.0, 0.0],
@@ -105,6 +108,9 @@ pub struct VolumeLengths {
     pub lengths: Vec<VolumeLength>,
     /// The same along the line of sight, where no board lay.
     pub along_sight: Vec<VolumeLength>,
+    /// Largest standard deviation of one of them by the calibration alone, mm; of a volume that is less deep, that of the part that it holds, as it
+    /// would be over the whole. `None` of a volume without a depth.
+    pub along_sight_mm: Option<f64>,
 }
 
 impl VolumeLengths {
@@ -153,7 +159,11 @@ impl VolumeLengths {
             places.par_iter().flat_map_iter(of_place).collect()
         };
         let (lengths, along_sight) = (through(directions), through(&[Vector3::z()]));
-        VolumeLengths { length_mm, lengths, along_sight, volume, extent: Extent::Boards }
+        let along_sight_mm = PARTS.into_iter().find_map(|part| {
+            let of = |length: VolumeLength| length.calibration_mm / part;
+            through(&[Vector3::z() * part]).into_iter().map(of).reduce(f64::max)
+        });
+        VolumeLengths { length_mm, lengths, along_sight, along_sight_mm, volume, extent: Extent::Boards }
     }
 
     /// The length for which this is largest, with its value.

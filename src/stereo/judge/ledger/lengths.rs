@@ -1,7 +1,7 @@
 //! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on what residuals, rays and
 //! epipolar lines say of them.
 
-use super::facts::Case;
+use super::facts::{Case, Facts};
 use crate::diagnostic::{summed, two_digits};
 use crate::statistics::median;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
@@ -87,7 +87,7 @@ pub(super) fn any_length(case: &Case) -> Evidence {
             case.facts.expansion.calibration,
             case.calibration.pair_scatter.groups,
             case.facts.volume.extent.said(),
-            along_sight(case)
+            unseen(case)
         ),
     };
     Evidence::of_length(
@@ -100,7 +100,7 @@ pub(super) fn any_length(case: &Case) -> Evidence {
 }
 
 /// What lengths that no board showed would be known to.
-fn along_sight(case: &Case) -> String {
+fn unseen(case: &Case) -> String {
     if case.facts.volume.extent != Extent::Boards {
         return String::new();
     }
@@ -108,6 +108,24 @@ fn along_sight(case: &Case) -> String {
     worst.map_or(String::new(), |mm| {
         format!(". Along the line of sight, where no board lay, it would be {} mm", two_digits(mm))
     })
+}
+
+/// What the calibration alone makes of lengths that no board showed: of a robot's way towards the cameras, over whose target the corners' noise averages
+/// out. Boards that hardly tilt fit rigs whose depths differ by a tenth.
+pub(super) fn along_sight(case: &Case) -> Option<Evidence> {
+    let Facts { volume, expansion, .. } = case.facts;
+    let sigma_mm = volume.along_sight_mm.filter(|_| volume.extent == Extent::Boards)?;
+    Some(Evidence::of_length(
+        "calibration along the line of sight",
+        "tilt the board by 20 to 45 degrees about both axes, at several distances",
+        Some(expansion.calibration * sigma_mm),
+        case,
+        format!(
+            "expanded uncertainty, by the calibration alone, of a length of {:.0} mm along the line of sight, where it is largest in the volume: a focal \
+             length that is hardly known stretches all depths",
+            volume.length_mm
+        ),
+    ))
 }
 
 pub(super) fn models(case: &Case) -> Evidence {

@@ -32,6 +32,7 @@ pub fn ledger(case: &Case) -> Vec<Evidence> {
         pairs::poses(case),
         pairs::tilts(case),
     ];
+    lines.extend(lengths::along_sight(case));
     lines.extend(pairs::focal_lengths(case));
     lines.extend(pairs::baseline(case));
     lines.extend(lengths::tolerance(case));
