@@ -51,7 +51,9 @@ impl Search {
         const ENOUGH_PX: f64 = 30.0;
         match way {
             // All of it was looked at corner by corner: more looking would only find a part of what is there.
-            Way::Sectors | Way::Darkened => self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0),
+            Way::Sectors | Way::Darkened => {
+                self.partial.is_some() || self.seen.as_ref().is_some_and(|(grid, _)| tells(grid).0)
+            }
             Way::Grow => {
                 let partial = self.partial.as_ref().map(|p| (&p.corners, p.level));
                 let known = [partial, self.seen.as_ref().map(|(grid, level)| (grid, *level))];

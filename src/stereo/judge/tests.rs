@@ -4,6 +4,7 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
 use crate::geometry::transform;
 use crate::imaging::{Corner, Corners};
+use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::ledger::Standards;
@@ -24,6 +25,12 @@ fn world(pairs: usize, seed: u64) -> World {
 
 fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
     calibrated_and_judged(corners, second).1
+}
+
+fn judge_at(corners: &Corners, tolerance_mm: f64) -> Judged {
+    let asked = Asked { options: Options::default(), tolerance_mm, extent: Extent::Boards };
+    let (found, findings) = calibrate_standing(corners, &asked).unwrap();
+    synthetic::judged(&found, findings, Standards::default(), tolerance_mm)
 }
 
 fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, Judged) {
@@ -227,5 +234,27 @@ fn a_focal_length_that_no_lens_has_is_no_basis_of_a_pass() {
         let wide = judged.evidence.iter().find(|line| line.what == "focal lengths");
         assert_eq!(wide.is_none(), pass, "{focal_px}: {wide:?}");
         assert!(wide.is_none_or(|line| line.allows == Verdict::Undecided && line.detail.contains("no lens")));
+    }
+}
+
+#[test]
+fn boards_that_hardly_tilt_do_not_vouch_for_depths() {
+    let of_tilt = |tilt: f64, seed: u64| {
+        let mut world = World { sigma_px: 0.02, ..World::new(12, seed) };
+        let mut draws = Draws::new(seed, Purpose::CheckPoses, 3);
+        for pose in &mut world.poses {
+            let turn =
+                Vector3::new(draws.uniform(-tilt, tilt), 0.17 + draws.uniform(-tilt, tilt), draws.uniform(-0.4, 0.4));
+            *pose = transform(turn, pose.translation.vector);
+        }
+        let judged = judge_at(&world.corners(seed), 1.0);
+        let of = |what| line(&judged, what).value.unwrap();
+        (of("calibration along the line of sight"), of("any length in the volume"))
+    };
+    for seed in [1, 2, 3] {
+        let [(tilted, _), (flat, across)] = [0.6, 0.05].map(|tilt| of_tilt(tilt, seed));
+        assert!(flat > 3.0 * tilted, "{flat} {tilted}");
+        // A tolerance that the lengths across would meet is not met.
+        assert!(flat > 1.5 * across, "{flat} {across}");
     }
 }
