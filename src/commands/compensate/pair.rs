@@ -52,6 +52,9 @@ impl Pair {
         if file::is_identified(&args.robot) && !file::is_identified(&args.identified) {
             return Err(Error::Exchanged { robot, identified: found }.into());
         }
+        if let Some(mended) = check.as_ref().map(|check| &check.mended).filter(|mended| !mended.is_empty()) {
+            return Err(Error::OtherCounting { robot, identified: found, mended: mended.clone() }.into());
+        }
         let same = |(a, b): (&Joint, &Joint)| a.slides == b.slides;
         if nominal.joints.len() != identified.joints.len() || !nominal.joints.iter().zip(&identified.joints).all(same) {
             return Err(Error::Different { identified: kinds(&identified), nominal: kinds(&nominal) }.into());

@@ -8,6 +8,8 @@
 //! What goes wrong: two faults at once are found one after the other only where each alone brings an improvement. What the target's
 //! unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
 
+use std::iter;
+
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, hypotheses, still};
@@ -110,11 +112,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         let Some(&(there, hypothesis)) = best.filter(|(there, _)| cut.is_none_or(|cut| there.fitted < cut)) else {
             break;
         };
-        let same: Vec<String> = tried
-            .iter()
-            .filter(|(other, h)| *h != hypothesis && other.is_the_same(&there))
-            .map(|(_, h)| format!(", or, which these readings do not tell apart, {}", h.name()))
-            .collect();
+        let others = tried.iter().filter(|(other, h)| *h != hypothesis && other.is_the_same(&there));
+        let others: Vec<Hypothesis> = others.map(|(_, h)| *h).collect();
+        let same: Vec<String> =
+            others.iter().map(|h| format!(", or, which these readings do not tell apart, {}", h.name())).collect();
+        let mend: Vec<String> = iter::once(&hypothesis).chain(&others).map(|h| h.mend()).collect();
         let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
@@ -128,12 +130,13 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
                 (Some(_), Hypothesis::Lengths(.., unit)) => {
                     format!("`--units {}` says so, if the robot file is the right one", unit.flag())
                 }
-                _ => {
-                    "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)".to_owned()
-                }
+                _ => format!(
+                    "mended for this run; mend {} (`examine = false` in [identify] takes it as it is)",
+                    mend.join(", or ")
+                ),
             },
         );
-        list.push(finding.about(rows));
+        list.push(Finding { of_joints: hypothesis.is_of_counting(), ..finding.about(rows) });
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);

@@ -44,7 +44,8 @@ pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
         return None;
     }
     let missed = Missed { alone_px: calibration.alone_px, paired_px: misfit.usual_px };
-    other_sides(calibration, &misfit).or_else(|| missed.is_of_two_moments().then(|| not_simultaneous(calibration.alone_px, misfit)))
+    other_sides(calibration, &misfit)
+        .or_else(|| missed.is_of_two_moments().then(|| not_simultaneous(calibration.alone_px, misfit)))
 }
 
 /// How far pairs miss their common rig.

@@ -37,7 +37,8 @@ struct Apart {
 pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) -> Vec<(Cause, String)> {
     let apart: Vec<Option<Apart>> = strays.iter().map(|&(i, px)| apart(series, i, px)).collect();
     let alone = series.alone_px.iter().flat_map(|side| side.iter().flatten().copied());
-    let others_moved = median(alone).is_some_and(|alone_px| Missed { alone_px, paired_px: usual_px }.is_of_two_moments())
+    let others_moved = median(alone)
+        .is_some_and(|alone_px| Missed { alone_px, paired_px: usual_px }.is_of_two_moments())
         || apart.iter().flatten().any(|apart| apart.larger.is_none());
     let baseline_mm = series.shared.rig.baseline_mm();
     let explained = |(k, &(_, missed_px)): (usize, &(usize, Option<f64>))| {

@@ -22,7 +22,8 @@ use crate::stereo::{Camera, Lens, Rig};
 /// Both cameras with this lens, as their own pictures tell it. `None` where these do not.
 pub fn lenses(start: &Problem, board: &Board, lens: Lens, missed: Missed) -> Option<KnownLenses> {
     let once_more = (missed.alone_px / missed.paired_px).powi(2);
-    let [(left, of_left), (right, of_right)] = [one(start, board, lens, Side::Left)?, one(start, board, lens, Side::Right)?];
+    let [(left, of_left), (right, of_right)] =
+        [one(start, board, lens, Side::Left)?, one(start, board, lens, Side::Right)?];
     let layout = Layout { transform: false, ..Layout::rig(lens, false) };
     let (n, at) = (of_left.nrows(), layout.camera_start(Side::Right));
     let mut matrix = DMatrix::zeros(layout.count(), layout.count());
@@ -38,8 +39,10 @@ fn one(start: &Problem, board: &Board, lens: Lens, side: Side) -> Option<(Camera
     let camera = *start.values.shared.rig.camera(side);
     let shared = Shared { rig: Rig { left: camera, ..start.values.shared.rig.clone() }, shape_mm: FLAT };
     let pictures = start.views.iter().map(|view| as_left(view, side));
-    let (views, poses): (Vec<View>, Vec<_>) =
-        pictures.filter_map(|picture| Some((board_pose::fit(&shared, &picture)?, picture))).map(|(pose, view)| (view, pose)).unzip();
+    let (views, poses): (Vec<View>, Vec<_>) = pictures
+        .filter_map(|picture| Some((board_pose::fit(&shared, &picture)?, picture)))
+        .map(|(pose, view)| (view, pose))
+        .unzip();
     let priors = Priors::of_one_camera(&camera, board.diagonal_mm());
     let problem = Problem { views, values: Values { shared, poses }, priors };
     let alone = |shape| Layout { shape, ..Layout::one_camera(lens) };
