@@ -39,6 +39,19 @@ impl Day {
     }
 }
 
+impl Day {
+    /// The robot's advice beside the rig's verdict, where there is a robot.
+    fn advised(&self) -> &'static str {
+        match self.advice() {
+            "use" => "; robot: use it",
+            "check" => "; robot: check before use",
+            "keep-nominal" => "; robot: keep the nominal one",
+            "do-not-use" => "; robot: do not use it",
+            _ => "",
+        }
+    }
+}
+
 fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
     value.pointer(pointer).and_then(Value::as_str).unwrap_or("n/a")
 }
@@ -180,8 +193,8 @@ pub fn page(day: &Day) -> String {
         Some(check) if day.advice() == "check" && text(check, "/verdict") == "pass" => {
             "Check the identified robot before use".to_owned()
         }
-        Some(check) => format!("Rig: {}", text(check, "/verdict").to_uppercase()),
-        None => "Without a camera check".to_owned(),
+        Some(check) => format!("Rig: {}{}", text(check, "/verdict").to_uppercase(), day.advised()),
+        None => format!("Without a camera check{}", day.advised()),
     };
     let words: Vec<String> = [
         (&day.check, length_words as fn(&Value) -> String),

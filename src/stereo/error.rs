@@ -301,9 +301,7 @@ impl Explain for Error {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
                 Error::Shifted { .. } => "give pictures of one moment the same name, and leave those without a partner out",
-                Error::ChangedSide { .. } => {
-                    "use the pictures of both cameras as the cameras wrote them: look for what mirrors or inverts them when they are saved"
-                }
+                Error::ChangedSide { .. } => "use the pictures of both cameras as these wrote them: something changes those of one",
                 Error::NoSuchPair { .. } => "`--since` and `--known-move` take the names of pairs as the report lists them",
                 Error::MoveUnsettled { length_mm, candidates, fits } => {
                     let pairs = candidates.first().filter(|_| *fits > 0).map_or("BEFORE,AFTER", |(pairs, _)| pairs);
@@ -319,9 +317,7 @@ impl Explain for Error {
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::RigChanged { hint, .. } => hint,
                 Error::NoCovariance => "`stereocal camera-check IMAGES` writes a calibration.json with it",
-                Error::NothingMeasured { .. } => {
-                    "`--squares CxR` and `--square-mm MM` describe the target on the robot"
-                }
+                Error::NothingMeasured { .. } => "`--squares CxR` and `--square-mm MM` are of the target on the robot",
                 Error::LensNotExportable { most, .. } => {
                     return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
                 }
