@@ -70,9 +70,8 @@ fn what_a_fit_swallows_where_joints_move_little_is_named() {
 #[test]
 fn what_is_to_be_mended_is_named_with_its_file() {
     let (world, rows) = one_sphere(8.0, 1);
-    let found = |rows: &[Measurement]| {
-        examine(&Dataset::new(rows).unwrap(), &world.nominal, &Settings::default()).findings
-    };
+    let found =
+        |rows: &[Measurement]| examine(&Dataset::new(rows).unwrap(), &world.nominal, &Settings::default()).findings;
     assert!(found(&rows).is_empty());
     let negated = found(&joints(&rows, |q| q[3] = -q[3]));
     assert!(negated[0].of_joints && negated[0].action.contains("`sign` of joint 4 in the robot file"), "{negated:?}");
