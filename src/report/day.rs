@@ -360,6 +360,10 @@ mod tests {
     #[test]
     fn nothing_is_good_without_a_pass_or_with_parts_of_another_day() {
         assert!(day("pass").is_good());
+        let mut advised = day("pass");
+        advised.robot.as_mut().unwrap()["advice"] = "use".into();
+        assert!(page(&advised).contains("Rig: PASS; robot: use it"));
+        assert!(page(&Day { robot: None, ..day("pass") }).contains("Rig: PASS<"));
         assert!(!day("undecided").is_good());
         let broken = Day { breaks: vec!["measure.json was made with another rig".to_owned()], ..day("pass") };
         assert!(!broken.is_good());
