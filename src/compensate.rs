@@ -3,16 +3,28 @@
 //! In: the nominal robot, for which targets were written, the identified one, and targets: readings or poses of the tool. Out: readings
 //! that bring the real tool there, or why there are none. Method: numeric inverse kinematics on the identified model with all of its
 //! terms, started from the given readings, so that the posture is kept. A target that is out of reach, needs a joint beyond its limits or
-//! lies at a singular posture (where the small correction is a large turn) is refused and nothing about it changes.
+//! lies at a singular posture (where the small correction is a large turn) is refused and nothing about it changes. An arm of fewer than six joints
+//! cannot undo a tilt of its tool: the tool's place is corrected, and the orientation as far as the arm turns that way.
+
+mod refusal;
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::geometry::{Transform, transform};
+use crate::robot::inverse::Approach;
 use crate::robot::{Robot, inverse};
+
+pub use refusal::Refusal;
 
 /// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular one.
 const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
+
+/// Joints by which a tool is turned every way.
+const ALL_WAYS: usize = 6;
+
+/// What an arm of fewer joints may leave of an orientation, rad: more than robots are built off, and a target that is not one of this arm.
+const MOST_TILT_RAD: f64 = 0.05;
 
 /// How far a joint turns of which no file has the limits, rad: two turns, as the wrists of arms that turn farthest do.
 const MOST_TURNS_RAD: f64 = 2.0 * std::f64::consts::TAU;
@@ -41,63 +53,6 @@ pub enum Target {
     },
 }
 
-/// Why a target has no compensated readings.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Refusal {
-    /// The real robot does not get there.
-    OutOfReach {
-        /// What is missing, mm.
-        short_mm: f64,
-    },
-    /// A joint would have to leave its range; deg or mm.
-    Limit {
-        /// The joint, from 1.
-        joint: usize,
-        /// The reading needed.
-        needed: f64,
-        /// Its range.
-        range: (f64, f64),
-    },
-    /// The target itself is where a joint does not go; deg or mm.
-    Outside {
-        /// The joint, from 1.
-        joint: usize,
-        /// The reading that was given.
-        given: f64,
-        /// Its range.
-        range: (f64, f64),
-    },
-    /// The correction would turn a joint far: the posture is next to a singular one.
-    Singular {
-        /// The joint that turns most, from 1.
-        joint: usize,
-        /// By how much, deg.
-        turn_deg: f64,
-    },
-}
-
-impl std::fmt::Display for Refusal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Refusal::OutOfReach { short_mm } => write!(f, "out of reach by {short_mm:.2} mm"),
-            Refusal::Limit { joint, needed, range: (low, high) } => {
-                write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
-            }
-            Refusal::Outside { joint, given, range: (low, high) } => {
-                write!(f, "joint {joint} of the target is at {given:.3}; its range is {low:.3} to {high:.3}")?;
-                let as_degrees = given.to_radians();
-                if given.abs() > 360.0 && (*low..=*high).contains(&as_degrees) {
-                    write!(f, ": degrees, {as_degrees:.1}, where radians are read?")?;
-                }
-                Ok(())
-            }
-            Refusal::Singular { joint, turn_deg } => {
-                write!(f, "next to a singular posture: joint {joint} would turn by {turn_deg:.1} deg")
-            }
-        }
-    }
-}
-
 /// A target with its outcome.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Compensated {
@@ -105,6 +60,8 @@ pub struct Compensated {
     pub readings: Result<Vec<f64>, Refusal>,
     /// How far the real tool would have been off with the given readings, mm; `None` where there were none.
     pub miss_mm: Option<f64>,
+    /// What an arm of fewer than six joints leaves of the tool's orientation, rad; `None` for others.
+    pub left_rad: Option<f64>,
 }
 
 /// The two robots.
@@ -175,14 +132,38 @@ impl Compensator {
                 let miss_mm = Some((meant.translation.vector - there.translation.vector).norm());
                 let outside = self.beyond(given, |joint, given, range| Refusal::Outside { joint, given, range });
                 let kept = || self.kept(&self.base_from_flange(&meant), given);
-                Compensated { readings: outside.map_or_else(kept, Err), miss_mm }
+                self.with_left(
+                    Compensated { readings: outside.map_or_else(kept, Err), miss_mm, left_rad: None },
+                    &meant,
+                )
             }
             Target::Pose { root_from_tool, near_rad } => {
                 let wanted = self.base_from_flange(root_from_tool);
                 let near = |near: &Vec<f64>| self.near(&wanted, near);
                 let readings = near_rad.as_ref().map_or_else(|| self.anywhere(&wanted, posture), near);
-                Compensated { readings, miss_mm: None }
+                self.with_left(Compensated { readings, miss_mm: None, left_rad: None }, root_from_tool)
             }
+        }
+    }
+
+    /// With what is left of the orientation, where the arm has too few joints.
+    fn with_left(&self, found: Compensated, root_from_tool: &Transform) -> Compensated {
+        let left_rad = |readings: &[f64]| self.reached(readings).rotation.angle_to(&root_from_tool.rotation);
+        let joints = self.identified.joints.len();
+        let left_rad = found.readings.as_deref().ok().filter(|_| joints < ALL_WAYS).map(left_rad);
+        match left_rad.filter(|left| *left > MOST_TILT_RAD) {
+            Some(left) => {
+                Compensated { readings: Err(Refusal::Tilted { joints, left_deg: left.to_degrees() }), ..found }
+            }
+            None => Compensated { left_rad, ..found },
+        }
+    }
+
+    /// As near to the pose as this robot gets from there, the tool's place first where it has too few joints.
+    fn approach(&self, robot: &Robot, wanted: &Transform, start: &[f64]) -> Approach {
+        match robot.joints.len() < ALL_WAYS {
+            true => inverse::approach_place(robot, &(wanted * self.identified_tool), &self.identified_tool, start),
+            false => inverse::approach(robot, wanted, start),
         }
     }
 
@@ -203,7 +184,7 @@ impl Compensator {
 
     /// Readings for the pose, searched from `start`.
     fn near(&self, wanted: &Transform, start: &[f64]) -> Result<Vec<f64>, Refusal> {
-        let found = inverse::approach(&self.identified, wanted, start);
+        let found = self.approach(&self.identified, wanted, start);
         if found.arrived() { Ok(found.joints_rad) } else { Err(self.refusal(wanted, start, found.miss_mm)) }
     }
 
@@ -216,7 +197,7 @@ impl Compensator {
         let starts = starts.chain((0..ROW_STARTS).map(|k| inverse::spread_start(&self.identified, k)));
         let mut nearest: Option<(f64, Vec<f64>)> = None;
         for start in starts {
-            let found = inverse::approach(&self.identified, wanted, &start);
+            let found = self.approach(&self.identified, wanted, &start);
             if found.arrived() {
                 return Ok(found.joints_rad);
             }
@@ -230,7 +211,7 @@ impl Compensator {
 
     /// What is in the way of the pose: a limit, where the robot would get there without its limits.
     fn refusal(&self, wanted: &Transform, start: &[f64], short_mm: f64) -> Refusal {
-        let free = inverse::approach(&self.unlimited, wanted, start);
+        let free = self.approach(&self.unlimited, wanted, start);
         let limit = self.beyond(&free.joints_rad, |joint, needed, range| Refusal::Limit { joint, needed, range });
         limit.filter(|_| free.arrived()).unwrap_or(Refusal::OutOfReach { short_mm })
     }

@@ -7,4 +7,4 @@ pub mod provenance;
 mod refusal;
 
 pub use io::*;
-pub use out_dir::OutDir;
+pub use out_dir::{OutDir, or_usual};

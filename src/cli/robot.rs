@@ -276,7 +276,8 @@ pub struct RobotShow {
 /// Conventions of Denavit-Hartenberg tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum DhConvention {
-    /// alpha and a of the link behind the joint (Denavit and Hartenberg, Paul)
+    /// alpha and a of the link behind the joint (Denavit and Hartenberg, Paul), also `standard`
+    #[value(alias = "standard")]
     Classic,
     /// alpha and a of the link before the joint (Craig)
     Modified,

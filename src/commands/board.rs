@@ -50,7 +50,7 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
         format!("{object:#}\n")
     } else {
         format!(
-            "{} on {} ({} x {} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `camera-check IMAGES --board {}`\n",
+            "{} on {} ({} x {} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `stereocal camera-check IMAGES --board {}`\n",
             board,
             sheet.paper,
             sheet.width_mm,

@@ -70,7 +70,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json {
         json
     } else {
-        report::identify::summary(&record, file.as_deref(), placed.is_some(), &out)
+        report::identify::summary(&record, (file.as_deref(), &nominal), placed.is_some(), &out)
     };
     let status = record.advice.status();
     Ok(Outcome { stdout, status })

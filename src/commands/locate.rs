@@ -66,7 +66,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), &located.placed.robot, &all);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
-    let contradicted = || Check { advice: Advice::DoNotUse, reason: Fit::CONTRADICTED.to_owned() };
+    let contradicted = || Check { advice: Advice::DoNotUse, reason: Fit::CONTRADICTED.to_owned(), mended: Vec::new() };
     placement.check = located.fit.contradicted.then(contradicted).or(check);
     let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;

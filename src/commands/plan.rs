@@ -37,7 +37,7 @@ const PROGRAM: &str = "stereocal_plan";
 /// Runs the command.
 pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
-    let rig_file = args.calibration.clone().unwrap_or_else(|| out.join("calibration.json"));
+    let rig_file = calibration::file(args.calibration.as_deref(), &out, &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
     heed_rig(&calibrated);
     let Calibrated { rig, noise, pair_excess, .. } = calibrated;

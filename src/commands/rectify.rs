@@ -33,7 +33,7 @@ const FIRST_LOOKED_AT: usize = 4;
 /// Runs the command.
 pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
-    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
+    let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
     let mut doubts = heed_rig(&calibrated);
     let calibration::Calibrated { rig, board, volume, .. } = calibrated;

@@ -146,10 +146,15 @@ pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -
     });
     let mut names: Vec<String> = files.map(|entry| format!("`{}`", entry.path())).collect();
     names.sort();
+    let others = names.len().saturating_sub(NAMED);
     names.truncate(NAMED);
-    let hint = match names.is_empty() {
-        true => "name a file; this folder holds none that is read".to_owned(),
-        false => format!("name a file in it: {}", names.join(", ")),
+    let hint = match (names.is_empty(), others) {
+        (true, _) => "name a file; this folder holds none that is read".to_owned(),
+        (false, 0) => format!("name a file in it: {}", names.join(", ")),
+        (false, more) => format!(
+            "name a file in it: {} and {more} more; of files that hold a pose each make one table first, a row a pose",
+            names.join(", ")
+        ),
     };
     Error::format(path, None, format!("{what}: this is a folder, and a file is needed"), Some(&hint))
 }
@@ -303,6 +308,11 @@ mod tests {
         assert!(said().to_string().contains("this is a folder") && said().hint().unwrap().contains("holds none"));
         std::fs::write(path.join("robot.toml"), "").unwrap();
         assert_eq!(said().hint().unwrap(), format!("name a file in it: `{path}/robot.toml`"));
+        for pose in 0..6 {
+            std::fs::write(path.join(format!("pose_{pose}.txt")), "").unwrap();
+        }
+        let hint = said().hint().unwrap();
+        assert!(hint.contains("pose_3.txt` and 3 more; ") && hint.ends_with("one table first, a row a pose"), "{hint}");
     }
 
     #[test]

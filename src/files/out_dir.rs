@@ -52,6 +52,12 @@ struct State {
     swept: BTreeSet<Utf8PathBuf>,
 }
 
+/// The same of a folder that is not opened yet.
+pub fn or_usual(folder: &Utf8Path, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
+    let (here, usual) = (folder.join(name), usual.join(name));
+    if here.is_file() || !usual.is_file() { here } else { usual }
+}
+
 impl OutDir {
     /// Creates the folder where needed, checks that a file can be made in it, and waits for other runs that write into it.
     pub fn open(path: &Utf8Path) -> Result<OutDir> {
@@ -117,8 +123,7 @@ impl OutDir {
 
     /// The path of an earlier command's result: in this folder where it is there, else in the one where results usually are.
     pub fn or_usual(&self, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
-        let (here, usual) = (self.join(name), usual.join(name));
-        if here.is_file() || !usual.is_file() { here } else { usual }
+        or_usual(&self.path, name, usual)
     }
 
     /// The folder itself.

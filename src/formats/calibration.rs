@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
 use crate::diagnostic::at_most;
-use crate::files::{self, OutDir, Result};
+use crate::files::{self, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
 use crate::linear_algebra::rows;
+use crate::progress;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
@@ -300,10 +301,18 @@ impl CovarianceRecord {
 /// The own format's name in a results folder.
 pub const OWN_NAME: &str = "calibration.json";
 
-/// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder. Of a folder, the own file
-/// or else the one that another format goes by; an error where there is none, or where it could be either of two.
-pub fn file(named: Option<&Utf8Path>, out: &OutDir) -> Result<Utf8PathBuf> {
-    let Some(named) = named else { return Ok(out.join(OWN_NAME)) };
+/// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder, or of the usual one, which is then
+/// said. Of a folder, the own file or else the one that another format goes by; an error where there is none, or where it could be either of two.
+pub fn file(named: Option<&Utf8Path>, out: &Utf8Path, usual: &Utf8Path) -> Result<Utf8PathBuf> {
+    let Some(named) = named else {
+        let found = files::or_usual(out, OWN_NAME, usual);
+        if found.parent() != Some(out) {
+            progress::note(format!(
+                "the rig is that of {found}: none stands in {out}; `--calibration FILE` names another"
+            ));
+        }
+        return Ok(found);
+    };
     if !named.is_dir() {
         return Ok(named.to_owned());
     }

@@ -9,6 +9,9 @@ pub struct Finding {
     pub rows: Vec<String>,
     /// What was done: mended, left out, or nothing but this warning, and how to have it otherwise.
     pub action: String,
+    /// Whether it is about how joints are counted, so that readings for this robot mean something else than the robot file says.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub of_joints: bool,
 }
 
 /// Rows that a sentence names.
@@ -17,7 +20,7 @@ const NAMED: usize = 40;
 impl Finding {
     /// About all rows.
     pub fn new(finding: impl Into<String>, action: impl Into<String>) -> Finding {
-        Finding { finding: finding.into(), rows: Vec::new(), action: action.into() }
+        Finding { finding: finding.into(), rows: Vec::new(), action: action.into(), of_joints: false }
     }
 
     /// The same about these rows.

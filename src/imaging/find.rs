@@ -21,6 +21,7 @@ use super::refine::fields;
 use super::shown::{printed, unseen_lines};
 use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out};
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, overlay, refine};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
 use crate::progress;
@@ -47,6 +48,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
     let headers: Vec<[Announced; 2]> =
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
+    of_pages(&pairing.pairs, &headers).iter().for_each(progress::note);
     let sizes = majority_sizes(&headers);
     let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
     let folder = Folder { files: &pairing.pairs, headers: &headers, sizes };
@@ -90,6 +92,19 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
     Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
+}
+
+/// That files hold pictures beside the first, which are not read.
+fn of_pages(files: &[PairFiles], headers: &[[Announced; 2]]) -> Option<String> {
+    let all = files.iter().zip(headers).flat_map(|(files, of)| [(&files.left, &of[0]), (&files.right, &of[1])]);
+    let of_several = all.filter_map(|(path, header)| Some((path, header.as_ref().ok()?.pages)));
+    let several: Vec<_> = of_several.filter(|(_, pages)| *pages > 1).collect();
+    let (path, pages) = several.first()?;
+    Some(format!(
+        "{} {} more than one picture, {path} {pages}: only the first of each is read; save a file a picture",
+        count(several.len(), "file"),
+        if several.len() == 1 { "holds" } else { "hold" }
+    ))
 }
 
 /// The pairs that are looked at before all others, spread over them all, and the others.

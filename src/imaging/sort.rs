@@ -5,7 +5,7 @@
 //! cameras stand, which other pairs tell, decides between them later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done
 //! counts as one without a board.
 
-use super::board::Board;
+use super::board::{Board, Squares};
 use super::corners::{OpenPair, PairCorners, Skipped};
 use super::detect::Refusal;
 use super::input::cache::{Look, Sighting};
@@ -25,8 +25,14 @@ pub fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     let refused: Vec<Refusal> = seen.iter().flatten().filter_map(refusal).collect();
     let boards: Vec<Board> = refused.iter().filter_map(|refusal| refusal.seen).collect();
     // Where the markers of one picture are of a small dictionary and those of another of a larger one that begins with it, it is the larger.
-    let shown = |board: &Board| boards.iter().filter(|other| board.has_all_of(other)).count();
-    let board = boards.iter().max_by_key(|board| shown(board))?;
+    // A picture that shows a part of a board with markers tells the columns, and rows no farther than it goes.
+    let is_part = |board: &Board, part: &Board| {
+        let cut = Board { squares: Squares { rows: part.squares.rows, ..board.squares }, ..*board };
+        board.is_coded() && cut.has_all_of(part)
+    };
+    let is_of = |board: &Board, other: &Board| board.has_all_of(other) || is_part(board, other);
+    let shown = |board: &Board| boards.iter().filter(|other| is_of(board, other)).count();
+    let board = boards.iter().max_by_key(|board| (shown(board), board.squares.rows))?;
     (2 * shown(board) > refused.len()).then_some(*board)
 }
 
@@ -120,6 +126,16 @@ pub fn number_alike(found: Vec<Found>, board: Board) -> Vec<PairCorners> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn parts_of_one_board_with_markers_are_of_the_tallest() {
+        let look = |rows: usize| {
+            let seen = format!("charuco:11x{rows}:15:11:DICT_5X5_100").parse().ok();
+            Look::Err(Refusal { reason: "another".to_owned(), seen })
+        };
+        let seen = [[look(6), look(8)], [look(7), look(8)]];
+        assert_eq!(other_board(&seen), "charuco:11x8:15:11:DICT_5X5_100".parse().ok());
+    }
 
     #[test]
     fn another_board_is_the_folders_only_where_every_picture_shows_it() {

@@ -259,17 +259,23 @@ impl Taken<'_> {
         words.iter().map(|word| format!(", {word}")).collect()
     }
 
-    /// Columns of numbers that were left alone, but for those of `measure` that say how a row came about.
+    /// Columns of numbers, and of words that part the rows, that were left alone, but for those of `measure` that say how a row came about.
     fn unused(&self) -> String {
         const NAMED: usize = 12;
-        let of_measure = |name: &String| name.ends_with("_rad2") || ["fit_rms_mm", "corners"].contains(&name.as_str());
+        let of_measure =
+            |name: &String| name.ends_with("_rad2") || ["fit_rms_mm", "corners", "status"].contains(&name.as_str());
         let picked = &self.way.picked;
         let taken: Vec<At> = picked.columns().chain(picked.distance).chain(self.own().into_values()).collect();
         let mut left = Vec::new();
         for (part, file) in self.parts.iter().enumerate().filter(|(_, p)| !p.is_program()) {
             let is_left = |column: &usize| {
                 let at = At { part, column: *column };
-                matches!(file.kinds[*column], Kind::Numbers | Kind::Beyond) && !taken.contains(&at)
+                let is_told = match file.kinds[*column] {
+                    Kind::Numbers | Kind::Beyond => true,
+                    Kind::Words => parts_rows(file, *column),
+                    _ => false,
+                };
+                is_told && !taken.contains(&at)
             };
             let names = (0..file.width()).filter(is_left).map(|column| file.column_name(column));
             left.extend(names.filter(|name| !of_measure(name)));
@@ -280,4 +286,12 @@ impl Taken<'_> {
             _ => format!("; not used: {}", left.join(", ")),
         }
     }
+}
+
+/// Whether a column has a few words, each in several rows, as places and sessions have: it may be the group that the user means.
+fn parts_rows(file: &Part, column: usize) -> bool {
+    let mut words: Vec<&str> = file.rows.iter().map(|(_, row)| row[column].trim()).collect();
+    words.sort_unstable();
+    words.dedup();
+    (2..=file.rows.len() / 4).contains(&words.len())
 }

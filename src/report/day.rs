@@ -39,6 +39,19 @@ impl Day {
     }
 }
 
+impl Day {
+    /// The robot's advice beside the rig's verdict, where there is a robot.
+    fn advised(&self) -> &'static str {
+        match self.advice() {
+            "use" => "; robot: use it",
+            "check" => "; robot: check before use",
+            "keep-nominal" => "; robot: keep the nominal one",
+            "do-not-use" => "; robot: do not use it",
+            _ => "",
+        }
+    }
+}
+
 fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
     value.pointer(pointer).and_then(Value::as_str).unwrap_or("n/a")
 }
@@ -180,8 +193,8 @@ pub fn page(day: &Day) -> String {
         Some(check) if day.advice() == "check" && text(check, "/verdict") == "pass" => {
             "Check the identified robot before use".to_owned()
         }
-        Some(check) => format!("Rig: {}", text(check, "/verdict").to_uppercase()),
-        None => "Without a camera check".to_owned(),
+        Some(check) => format!("Rig: {}{}", text(check, "/verdict").to_uppercase(), day.advised()),
+        None => format!("Without a camera check{}", day.advised()),
     };
     let words: Vec<String> = [
         (&day.check, length_words as fn(&Value) -> String),
@@ -347,6 +360,10 @@ mod tests {
     #[test]
     fn nothing_is_good_without_a_pass_or_with_parts_of_another_day() {
         assert!(day("pass").is_good());
+        let mut advised = day("pass");
+        advised.robot.as_mut().unwrap()["advice"] = "use".into();
+        assert!(page(&advised).contains("Rig: PASS; robot: use it"));
+        assert!(page(&Day { robot: None, ..day("pass") }).contains("Rig: PASS<"));
         assert!(!day("undecided").is_good());
         let broken = Day { breaks: vec!["measure.json was made with another rig".to_owned()], ..day("pass") };
         assert!(!broken.is_good());

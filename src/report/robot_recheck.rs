@@ -19,6 +19,8 @@ pub struct Judged {
     pub tolerance_mm: f64,
     /// Whether the robot's own file advises against its use.
     pub advised_against: bool,
+    /// Whether the rows were mended for the check: they are not what their file says.
+    pub is_mended: bool,
 }
 
 fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String {
@@ -29,7 +31,8 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
     let tolerance = mm(tolerance_mm);
     let far_within =
         if recheck.changed && standing == Standing::StillValid { "far within the tolerance: " } else { "" };
-    let statement = format!("{far_within}{}", recheck.statement());
+    let mended = if judged.is_mended { "with the rows mended: " } else { "" };
+    let statement = format!("{mended}{far_within}{}", recheck.statement());
     let of_rest = match recheck.cause().is_empty() {
         true => format!(
             "{statement}; {} poses would have shown a single cause that moves the target by {} mm, tolerance {tolerance} mm",
@@ -47,6 +50,9 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
     match judged.standing {
         Standing::StillValid if judged.advised_against => {
             "identify anew: it is the same robot, and what was found of it is advised against"
+        }
+        Standing::StillValid if judged.is_mended => {
+            "mend the file as the warning says, and check again (until then the status is 1): the robot still is that robot for rows that were mended"
         }
         Standing::StillValid => "go on with this robot",
         Standing::Undecided if !recheck.strays.is_empty() => {

@@ -25,6 +25,10 @@ pub struct Check {
     /// Why, in one sentence; empty where there is nothing to say.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub reason: String,
+    /// How the joints of this robot are counted otherwise than the nominal robot's file says, and what to mend: readings for the one mean something
+    /// else for the other.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub mended: Vec<String>,
 }
 
 impl Advice {

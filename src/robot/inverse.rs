@@ -15,6 +15,9 @@ use crate::geometry::{Transform, rotation_vector};
 /// Length by which angles are weighed against mm: a robot's wrist at about arm's length.
 pub(super) const ARM_MM: f64 = 200.0;
 
+/// The same where the place comes first: so little that a turn that is missing moves the place by less than [`REACHED_MM`].
+const TURN_MM: f64 = 0.02;
+
 /// The pose is reached when the target is missed by less than this, mm (angles times the arm).
 const REACHED_MM: f64 = 1e-7;
 
@@ -87,15 +90,58 @@ impl Approach {
 
 /// Goes from `start_rad` (a reading a joint) as near to `base_from_flange` as it gets.
 pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Approach {
+    let missed = |q: &[f64]| miss(robot, base_from_flange, q);
+    let (q, residual) = descend(robot, start_rad, &missed, &|q| jacobian(robot, q));
+    let found = Approach { joints_rad: q, miss_mm: residual.norm() };
+    if found.arrived() { unwound(robot, base_from_flange, found, start_rad) } else { found }
+}
+
+/// The same for an arm of fewer than six joints, which turns its tool some ways only: the tool's place first, and of all readings that bring it there
+/// those by which its orientation is nearest. What is missing is said of the place alone.
+pub fn approach_place(
+    robot: &Robot,
+    base_from_tool: &Transform,
+    flange_from_tool: &Transform,
+    start_rad: &[f64],
+) -> Approach {
+    let weight = TURN_MM / ARM_MM;
+    let missed = |q: &[f64]| {
+        let reached = robot.base_from_flange(q) * flange_from_tool;
+        let t = reached.translation.vector - base_from_tool.translation.vector;
+        let r = rotation_vector(&(reached * base_from_tool.inverse())) * TURN_MM;
+        Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
+    };
+    let columns = |q: &[f64]| {
+        let mut columns = jacobian(robot, q);
+        let out = robot.base_from_flange(q).rotation * flange_from_tool.translation.vector;
+        for mut column in columns.column_iter_mut() {
+            let axis = nalgebra::Vector3::new(column[3], column[4], column[5]) / ARM_MM;
+            let moved = axis.cross(&out);
+            (0..3).for_each(|i| column[i] += moved[i]);
+            (3..6).for_each(|i| column[i] *= weight);
+        }
+        columns
+    };
+    let (joints_rad, residual) = descend(robot, start_rad, &missed, &columns);
+    Approach { joints_rad, miss_mm: residual.fixed_rows::<3>(0).norm() }
+}
+
+/// Readings and what they leave, once no step from `start_rad` leaves less.
+fn descend(
+    robot: &Robot,
+    start_rad: &[f64],
+    missed: &dyn Fn(&[f64]) -> Vector6<f64>,
+    columns: &dyn Fn(&[f64]) -> DMatrix<f64>,
+) -> (Vec<f64>, Vector6<f64>) {
     let mut q = start_rad.to_vec();
     clamp_to_limits(robot, &mut q);
-    let mut residual = miss(robot, base_from_flange, &q);
+    let mut residual = missed(&q);
     let mut damping = 1e-2;
     for _ in 0..MAX_STEPS {
         if residual.norm() < REACHED_MM || damping > 1e6 {
             break;
         }
-        let j = jacobian(robot, &q);
+        let j = columns(&q);
         let mut damped = j.tr_mul(&j);
         let gradient = j.tr_mul(&DVector::from_column_slice(residual.as_slice()));
         for k in 0..damped.nrows() {
@@ -105,7 +151,7 @@ pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) 
         let step = factor.solve(&gradient);
         let mut next: Vec<f64> = q.iter().zip(step.iter()).map(|(q, s)| q - s).collect();
         clamp_to_limits(robot, &mut next);
-        let next_residual = miss(robot, base_from_flange, &next);
+        let next_residual = missed(&next);
         if next_residual.norm() < residual.norm() {
             (q, residual) = (next, next_residual);
             damping = (damping * 0.1).max(1e-14);
@@ -113,8 +159,7 @@ pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) 
             damping *= 10.0;
         }
     }
-    let found = Approach { joints_rad: q, miss_mm: residual.norm() };
-    if found.arrived() { unwound(robot, base_from_flange, found, start_rad) } else { found }
+    (q, residual)
 }
 
 /// The same posture without the whole turns that the search took: each joint within half a turn of `near_rad`, as far as its limits let it. Where
@@ -241,6 +286,22 @@ mod tests {
         let wanted = robot.base_from_flange(&there);
         let q = unwound(&robot, &wanted, Approach { joints_rad: there.to_vec(), miss_mm: 0.0 }, &[0.0; 6]);
         assert_eq!(q.joints_rad, there);
+    }
+
+    /// Four axes: the place is reached whatever the tilt, and what is left of the orientation is the tilt alone.
+    #[test]
+    fn an_arm_of_few_joints_brings_the_tool_to_its_place() {
+        let turn = |a_mm| super::super::Joint { a_mm, ..Default::default() };
+        let slide = super::super::Joint { slides: true, ..Default::default() };
+        let robot = Robot { joints: vec![turn(0.0), turn(225.0), turn(175.0), slide], ..Robot::paper() };
+        let tool: Transform = Transform::translation(40.0, -25.0, 110.0);
+        let tilt = crate::geometry::transform(nalgebra::Vector3::new(3e-3, -2e-3, 0.0), nalgebra::Vector3::zeros());
+        let there = robot.base_from_flange(&[0.4, -0.6, 1.1, 30.0]) * tool;
+        let wanted = there * tilt;
+        let found = approach_place(&robot, &wanted, &tool, &[0.38, -0.63, 1.13, 28.0]);
+        assert!(found.arrived(), "{found:?}");
+        let left_rad = (robot.base_from_flange(&found.joints_rad) * tool).rotation.angle_to(&wanted.rotation);
+        assert!((left_rad - 3e-3_f64.hypot(2e-3)).abs() < 1e-6, "{left_rad}");
     }
 
     #[test]

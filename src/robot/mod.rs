@@ -63,6 +63,14 @@ pub enum Error {
         /// Which links, and by how much.
         apart: String,
     },
+    /// Targets for the nominal robot are not readings of the one that was found.
+    #[error("`{identified}` counts its joints otherwise than `{robot}`: {}", mended.join("; "))]
+    OtherCounting {
+        robot: String,
+        identified: String,
+        /// What `identify` mended.
+        mended: Vec<String>,
+    },
     /// A format that does not fit this robot.
     #[error("{message}")]
     NotExportable { message: String, hint: String },
@@ -103,6 +111,10 @@ impl Explain for Error {
                 "`--robot` names the file that `identify` was given, with the same signs and zeros of the joints, `--identified` the \
                  identified.toml that it wrote; `stereocal robot show FILE` says what each of them is",
             ),
+            Error::OtherCounting { robot, .. } => Some(format!(
+                "mend what is named, then `stereocal identify` again with {robot}, and `compensate` with what that writes: as they are, targets would \
+                 be read as if nothing had been mended"
+            )),
             Error::NotExportable { hint, .. } | Error::Table { hint, .. } => Some(hint.clone()),
             Error::File { .. } => None,
             Error::Files(e) => e.hint(),

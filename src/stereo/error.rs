@@ -8,6 +8,26 @@ use crate::stereo::Lens;
 /// How the reason begins where both sides of a pair hold one picture.
 pub const ONE_PICTURE: &str = "left and right picture are one picture";
 
+/// What was done to all pictures of one side; which side it was the pictures do not tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OneSide {
+    /// Left and right, or top and bottom, are exchanged.
+    Mirrored,
+    /// Black and white are exchanged, by which corners are numbered from another end of the board.
+    Inverted,
+}
+
+impl OneSide {
+    fn words(self) -> &'static str {
+        match self {
+            OneSide::Mirrored => "mirrored",
+            OneSide::Inverted => {
+                "inverted, black and white exchanged, so that the board's corners are counted from another end than on the other"
+            }
+        }
+    }
+}
+
 /// What can go wrong between corners and points.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -95,6 +115,18 @@ pub enum Error {
         left: String,
         /// Its partner.
         right: String,
+    },
+    /// All pictures of one side were changed on their way from the camera.
+    #[error(
+        "the pictures of one side are {}: with that undone in the right ones {fit} of {of} pairs fit one rig, and as they are they do not",
+        what.words()
+    )]
+    ChangedSide {
+        what: OneSide,
+        /// Pairs that fit one rig then.
+        fit: usize,
+        /// Pairs there are.
+        of: usize,
     },
     /// A pair that was asked for and is not there.
     #[error("there is no pair {pair} with a board in both pictures; there are {}", named(.pairs))]
@@ -269,6 +301,7 @@ impl Explain for Error {
                     "trigger both cameras at once, clamp them and the board, and check that equal names belong together"
                 }
                 Error::Shifted { .. } => "give pictures of one moment the same name, and leave those without a partner out",
+                Error::ChangedSide { .. } => "use the pictures of both cameras as these wrote them: something changes those of one",
                 Error::NoSuchPair { .. } => "`--since` and `--known-move` take the names of pairs as the report lists them",
                 Error::MoveUnsettled { length_mm, candidates, fits } => {
                     let pairs = candidates.first().filter(|_| *fits > 0).map_or("BEFORE,AFTER", |(pairs, _)| pairs);
@@ -284,9 +317,7 @@ impl Explain for Error {
                 Error::NotConverged { .. } => "`--lens radial2` has fewer unknowns; add pairs with the board tilted",
                 Error::RigChanged { hint, .. } => hint,
                 Error::NoCovariance => "`stereocal camera-check IMAGES` writes a calibration.json with it",
-                Error::NothingMeasured { .. } => {
-                    "`--squares CxR` and `--square-mm MM` describe the target on the robot"
-                }
+                Error::NothingMeasured { .. } => "`--squares CxR` and `--square-mm MM` are of the target on the robot",
                 Error::LensNotExportable { most, .. } => {
                     return Some(format!("calibrate with `--lens {most}`, or `--format opencv`"));
                 }

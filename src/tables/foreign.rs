@@ -40,6 +40,9 @@ fn of_json(value: &Value, file: &str) -> String {
     let loaded = format!("json.load(open('{file}'))");
     let columns = |v: &Value| v.as_object().is_some_and(|o| !o.is_empty() && o.values().all(Value::is_array));
     let named = |v: &Value| v.as_object().is_some_and(|o| o.len() > 1 && o.values().all(Value::is_object));
+    if by_columns(value) {
+        return format!("in Python: `import pandas; pandas.read_json('{file}').to_csv('table.csv', index=False)`");
+    }
     let frame = match longest_list(value) {
         Some((_, keys)) if keys.is_empty() => format!("json_normalize({loaded})"),
         Some((_, keys)) => format!("json_normalize({loaded}, record_path=['{}'])", keys.join("', '")),
@@ -48,6 +51,19 @@ fn of_json(value: &Value, file: &str) -> String {
         None => format!("json_normalize({loaded})"),
     };
     in_python("json", &frame)
+}
+
+/// Whether it is what `DataFrame.to_json` writes: columns by name, of each the values by the rows' numbers.
+fn by_columns(value: &Value) -> bool {
+    let rows = |column: &Value| {
+        let cells = column.as_object()?;
+        let is_cell =
+            |(row, cell): (&String, &Value)| row.parse::<u64>().is_ok() && !cell.is_object() && !cell.is_array();
+        (!cells.is_empty() && cells.iter().all(is_cell)).then_some(cells.len())
+    };
+    let columns = value.as_object().into_iter().flatten().map(|(_, column)| rows(column));
+    let lengths: Option<Vec<usize>> = columns.collect();
+    lengths.is_some_and(|lengths| lengths.len() > 1 && lengths.iter().all(|length| *length == lengths[0]))
 }
 
 fn in_python(package: &str, frame: &str) -> String {

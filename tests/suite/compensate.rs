@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use camino::Utf8Path;
-use stereocal::robot::{Robot, catalogue, file, inverse};
+use stereocal::robot::{Advice, Check, Robot, catalogue, file, inverse};
 
 use crate::run::{stderr, stdout, stereocal, workplace};
 
@@ -83,6 +83,13 @@ fn targets_come_back_where_they_were_meant() {
     assert!(apart.contains("`--tool X,Y,Z` names the one that works"), "{apart}");
     let named = run(folder.path(), &["targets.csv", "--out", "named", "--tool", "0,0,100"], 0);
     assert!(!named.contains("the tools of the two files"), "{named}");
+    assert!(
+        named.contains("the target was found at 0.000, 3.000, 94.000 mm, 5.0 mm from that of robot.toml,"),
+        "{named}"
+    );
+    assert!(named.contains("(d_6, theta_6): that stays in this tool"), "{named}");
+    let measured = run(folder.path(), &["targets.csv", "--out", "measured", "--tool", "0,3,94"], 0);
+    assert!(!measured.contains("stays in this tool"), "{measured}");
     robots(folder.path());
     for (q, (found, status)) in postures.iter().zip(rows(&folder.path().join("out/compensated.csv"))) {
         assert_eq!(status, "ok");
@@ -505,4 +512,99 @@ fn angles_in_another_unit_are_said() {
         assert_eq!(stderr(&output).contains("are these degrees?"), is_degrees, "{turn}: {}", stderr(&output));
         assert_eq!(output.status.code() == Some(2), is_degrees, "{turn}");
     }
+}
+
+#[test]
+fn an_arm_of_four_joints_is_corrected_in_its_places() {
+    let folder = workplace();
+    let joint = |alpha: f64, a: f64, d: f64, slides: bool| {
+        let kind = if slides { "type = \"prismatic\"\nlimits_mm = [0.0, 150.0]\n" } else { "" };
+        format!("[[joint]]\n{kind}alpha_deg = {alpha:?}\na_mm = {a:?}\ntheta_deg = 0.0\nd_mm = {d:?}\n")
+    };
+    let arm = |off: f64| {
+        let joints = [
+            joint(0.0, 0.0, 387.0, false),
+            joint(off, 225.0 + off, 0.0, false),
+            joint(180.0 - off, 175.0, 0.0, true),
+            joint(off, off, 60.0, false),
+        ];
+        format!(
+            "name = \"scara\"\nconvention = \"mdh\"\n{}[tool]\nx_mm = 40.0\ny_mm = -25.0\nz_mm = 110.0\n",
+            joints.concat()
+        )
+    };
+    std::fs::write(folder.path().join("robot.toml"), arm(0.0)).unwrap();
+    std::fs::write(folder.path().join("identified.toml"), arm(0.1)).unwrap();
+    let targets = [[20.0, 60.0, 75.0, 30.0], [-70.0, -40.0, 20.0, 100.0], [5.0, 100.0, 140.0, -150.0]];
+    let row = |(k, q): (usize, &[f64; 4])| format!("t{k},{},{},{},{}\n", q[0], q[1], q[2], q[3]);
+    let table: String = targets.iter().enumerate().map(row).collect();
+    std::fs::write(folder.path().join("t.csv"), format!("name,j1_deg,j2_deg,j3_mm,j4_deg\n{table}")).unwrap();
+    let said = run(folder.path(), &["t.csv"], 0);
+    assert!(said.contains("3 of 3 targets compensated"), "{said}");
+    assert!(
+        said.contains("an arm of 4 joints cannot turn its tool every way: its place is corrected, and up to 0."),
+        "{said}"
+    );
+    let robot = |name: &str| file::read(Utf8Path::from_path(&folder.path().join(name)).unwrap()).unwrap();
+    let (nominal, real) = (robot("robot.toml"), robot("identified.toml"));
+    let in_robot = |q: &[f64]| vec![q[0].to_radians(), q[1].to_radians(), q[2], q[3].to_radians()];
+    let mut reader = csv::Reader::from_path(folder.path().join("out/compensated.csv")).unwrap();
+    for (row, q) in reader.records().map(Result::unwrap).zip(&targets) {
+        let found: Vec<f64> = (1..5).map(|c| row[c].parse().unwrap()).collect();
+        let off_mm = (nominal.target_mm(&in_robot(q)) - real.target_mm(&in_robot(&found))).norm();
+        assert!(off_mm < SAME_MM, "{off_mm}");
+    }
+    // A pose that stands on its side is none of this arm.
+    let lying =
+        "name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad,j1_deg,j2_deg,j3_mm,j4_deg\nlying,300,100,150,1.57,0,0,20,60,75,30\n";
+    std::fs::write(folder.path().join("t.csv"), lying).unwrap();
+    let said = run(folder.path(), &["t.csv", "--force"], 1);
+    assert!(said.contains("an arm of 4 joints cannot turn its tool so there: "), "{said}");
+}
+
+#[test]
+fn targets_of_a_robot_whose_joints_were_mended_are_refused() {
+    let folder = workplace();
+    let (nominal, real) = robots(folder.path());
+    std::fs::write(folder.path().join("targets.csv"), csv(&postures(&nominal, 4))).unwrap();
+    let with = |mended: &[&str]| {
+        let mended = mended.iter().map(|said| (*said).to_owned()).collect();
+        let check = Check { advice: Advice::Check, reason: "the floor shook".to_owned(), mended };
+        std::fs::write(folder.path().join("identified.toml"), file::to_toml_checked(&real, Some(&check))).unwrap();
+    };
+    with(&[]);
+    run(folder.path(), &["targets.csv"], 0);
+    with(&["joint 3 is counted together with joint 2; mend the table"]);
+    let said = run(folder.path(), &["targets.csv", "--force"], 2);
+    assert!(said.contains("counts its joints otherwise than `robot.toml`: joint 3 is counted together"), "{said}");
+    assert!(said.contains("`stereocal identify` again with robot.toml"), "{said}");
+}
+
+#[test]
+fn targets_far_outside_of_the_ranges_of_the_identification_are_said() {
+    let folder = workplace();
+    let (nominal, _) = robots(folder.path());
+    let postures = postures(&nominal, 12);
+    std::fs::write(folder.path().join("targets.csv"), csv(&postures)).unwrap();
+    let known = |ranges: &[[f64; 2]]| {
+        let expected = serde_json::json!({ "mean_mm": 0.05, "p95_mm": 0.1, "map": [], "joint_ranges": ranges });
+        let record = serde_json::json!({ "expected": expected }).to_string();
+        std::fs::write(folder.path().join("identification.json"), record).unwrap();
+    };
+    known(&[[-360.0, 360.0]; 6]);
+    assert!(!run(folder.path(), &["targets.csv"], 0).contains("was not identified"));
+    // A narrow range of the first joint alone, which turns the whole arm, is no reason to stop.
+    let mut ranges = [[-360.0, 360.0]; 6];
+    ranges[0] = [10.0, 12.0];
+    known(&ranges);
+    let said = run(folder.path(), &["targets.csv", "--force"], 0);
+    assert!(
+        said.contains("stand where the robot was not identified, and it may be farther off")
+            && said.contains("joint 1 in "),
+        "{said}"
+    );
+    ranges[2] = [10.0, 12.0];
+    known(&ranges);
+    let said = run(folder.path(), &["targets.csv", "--force"], 1);
+    assert!(said.contains("nothing says how far off it is there") && said.contains("joint 3 in "), "{said}");
 }

@@ -153,6 +153,7 @@ fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
     rows(at, |_| ());
     let (_, said) = against();
     assert!(!said.contains("mended for this run") && !said.contains("CHANGED"), "{said}");
+    assert!(!said.contains("rows mended"), "{said}");
     rows(at, |rows| scaled(rows, POINT..POINT + 3, 0.001));
     let (status, said) = against();
     assert!(status == 1 && said.contains("the readings are in m, not in mm"), "{said}");
@@ -164,6 +165,8 @@ fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
         status != 0 && said.contains("joint 3 is counted the other way round") && !said.contains("CHANGED"),
         "{said}"
     );
+    // Why the status is 1 although the robot holds.
+    assert!(said.contains("with the rows mended: ") && !said.contains("go on with this robot"), "{said}");
 }
 
 #[test]

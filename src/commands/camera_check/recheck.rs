@@ -30,7 +30,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let of_flag = |error: crate::files::Error| error.with_hint(HINT);
-    let file = calibration::file(Some(against), &out).map_err(of_flag)?;
+    let file = calibration::file(Some(against), out.path(), &config.out).map_err(of_flag)?;
     let calibrated = calibration::read(&file).map_err(of_flag)?;
     // What the calibration was held against says what it has to hold still.
     let of_check = || calibrated.check.map_or(config.tolerance_mm, |check| check.tolerance_mm);

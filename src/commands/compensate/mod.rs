@@ -61,10 +61,14 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
         out.write(&program_name, &program.encoding.encoded(&text))?;
     }
     let motions = program.as_ref().map(|program| program.outcome(&found));
+    let there: Vec<&[f64]> = found.iter().filter_map(|f| f.readings.as_deref().ok()).collect();
+    let beyond = super::verify::beyond::targets(&args.identified, &pair.identified, &there);
+    beyond.iter().for_each(|(said, _)| progress::warn(said));
+    let is_known = beyond.is_none_or(|(_, far)| !far);
     let summary = Summary::new(&rows, &found, motions.as_deref(), &pair);
     let json = out.write_json("compensate.json", &summary)?;
     let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
-    let whole = summary.is_whole() && pair.same.is_none() && !pair.tools_differ;
+    let whole = summary.is_whole() && is_known && pair.same.is_none() && !pair.tools_differ;
     let status = if whole { heeded } else { Status::OutOfTolerance };
     Ok(Outcome {
         stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) },

@@ -52,6 +52,9 @@ impl Pair {
         if file::is_identified(&args.robot) && !file::is_identified(&args.identified) {
             return Err(Error::Exchanged { robot, identified: found }.into());
         }
+        if let Some(mended) = check.as_ref().map(|check| &check.mended).filter(|mended| !mended.is_empty()) {
+            return Err(Error::OtherCounting { robot, identified: found, mended: mended.clone() }.into());
+        }
         let same = |(a, b): (&Joint, &Joint)| a.slides == b.slides;
         if nominal.joints.len() != identified.joints.len() || !nominal.joints.iter().zip(&identified.joints).all(same) {
             return Err(Error::Different { identified: kinds(&identified), nominal: kinds(&nominal) }.into());
@@ -81,7 +84,11 @@ impl Pair {
     fn choose_tool(&mut self, args: &Compensate) -> f64 {
         let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
         self.tool_mm = <[f64; 3]>::try_from(args.tool.as_slice()).ok().map(Vector3::from);
-        if self.tool_mm.is_some() || drawn == found {
+        if let Some(typed) = self.tool_mm {
+            self.of_tools = self.stays(typed, &args.robot);
+            return 0.0;
+        }
+        if drawn == found {
             return 0.0;
         }
         let lacks = |without, with, tool_mm: Vector3<f64>| {
@@ -114,6 +121,26 @@ impl Pair {
             format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too: `--tool X,Y,Z` names the one that works")
         });
         apart_mm
+    }
+}
+
+impl Pair {
+    /// What no measurement of a point told from the target's own place, and what therefore stays in another tool: the last link's length and zero.
+    fn stays(&self, typed: Vector3<f64>, robot: &Utf8Path) -> Option<String> {
+        let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
+        if found == Vector3::zeros() || (found - typed).norm() < SAME_MM {
+            return None;
+        }
+        let last = self.nominal.joints.len();
+        // Of a tool far from the target nothing says where that was meant to be.
+        let (meant, whose) = if drawn == Vector3::zeros() { (typed, "this tool") } else { (drawn, robot.as_str()) };
+        let apart_mm = Some((found - meant).norm()).filter(|apart| *apart <= TYPED_MM);
+        let place = apart_mm.map_or_else(String::new, |apart| format!(", {apart:.1} mm from that of {whose},"));
+        Some(format!(
+            "the target was found at {} mm{place} and a point does not tell it from what the last link is off by (d_{last}, theta_{last}): \
+             that stays in this tool",
+            tool_text(&found.into())
+        ))
     }
 }
 

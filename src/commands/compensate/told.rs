@@ -23,6 +23,9 @@ pub(super) struct Summary {
     before_mean_mm: Option<f64>,
     /// Largest.
     before_max_mm: Option<f64>,
+    /// What an arm of fewer than six joints leaves of orientations at most, deg.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    orientation_left_deg: Option<f64>,
     /// The tool that was used for both robots, in the last frame, mm; absent where each file has its own.
     #[serde(skip_serializing_if = "Option::is_none")]
     tool_mm: Option<[f64; 3]>,
@@ -69,6 +72,7 @@ impl Summary {
             compensated: rows.len() - refused.len(),
             before_mean_mm: (!misses.is_empty()).then(|| misses.iter().sum::<f64>() / misses.len() as f64),
             before_max_mm: misses.iter().copied().reduce(f64::max),
+            orientation_left_deg: found.iter().filter_map(|f| f.left_rad).reduce(f64::max).map(f64::to_degrees),
             tool_mm: pair.tool_mm.map(Into::into),
             check: pair.check.clone(),
             refused,
@@ -117,6 +121,12 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
         text += &format!(
             "without it the real tool would be off by {mean:.3} mm on average, {max:.3} at most (in the base frame; the errors of `identify` are \
              those after a rigid fit of each placement)\n"
+        );
+    }
+    if let Some(left_deg) = summary.orientation_left_deg {
+        text += &format!(
+            "an arm of {} joints cannot turn its tool every way: its place is corrected, and up to {left_deg:.3} deg of its orientation stay\n",
+            pair.nominal.joints.len()
         );
     }
     pair.of_tools.iter().for_each(|said| text += &format!("{said}\n"));

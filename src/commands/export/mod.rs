@@ -24,8 +24,7 @@ pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
 
 fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
-    let named = args.calibration.clone().unwrap_or_else(|| out.or_usual(rig::OWN_NAME, &config.out));
-    let rig_file = rig::file(Some(&named), &out)?;
+    let rig_file = rig::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = rig::read(&rig_file)?;
     heed_rig(&calibrated);
     let rig = calibrated.rig;

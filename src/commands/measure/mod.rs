@@ -31,7 +31,7 @@ use crate::{progress, report};
 /// Runs the command.
 pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
-    let rig_file = calibration::file(args.calibration.as_deref(), &out)?;
+    let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
     let (known, doubts) = knowledge(args, config, &rig_file)?;

@@ -3,7 +3,7 @@
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
 //! sessions get placements of their own. The robots are those of their files.
 
-mod beyond;
+pub(super) mod beyond;
 mod recheck;
 
 use camino::Utf8Path;

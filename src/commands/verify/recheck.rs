@@ -77,7 +77,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         length_mm: None,
     });
     let advised_against = check.is_some_and(|check| check.advice == Advice::DoNotUse);
-    let judged = Judged { standing: content.standing, tolerance_mm, advised_against };
+    let judged = Judged { standing: content.standing, tolerance_mm, advised_against, is_mended: is_mended.is_some() };
     let page = report::robot_recheck::page(&found, judged, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;

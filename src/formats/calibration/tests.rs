@@ -30,11 +30,14 @@ fn a_rig_survives_the_file() {
 fn a_folder_stands_for_the_one_calibration_in_it() {
     let folder = tempfile::tempdir().unwrap();
     let path = Utf8Path::from_path(folder.path()).unwrap();
-    let out = OutDir::open(&path.join("out")).unwrap();
+    let (out, usual) = (path.join("new"), path.join("out"));
+    std::fs::create_dir(&usual).unwrap();
     let put = |name: &str| std::fs::write(path.join(name), "").unwrap();
-    let found = || file(Some(path), &out).map_err(|e| e.to_string());
-    assert_eq!(file(None, &out).unwrap(), path.join("out/calibration.json"));
-    assert_eq!(file(Some(&path.join("a.json")), &out).unwrap(), path.join("a.json"));
+    let found = || file(Some(path), &out, &usual).map_err(|e| e.to_string());
+    assert_eq!(file(None, &out, &usual).unwrap(), path.join("new/calibration.json"));
+    put("out/calibration.json");
+    assert_eq!(file(None, &out, &usual).unwrap(), path.join("out/calibration.json"));
+    assert_eq!(file(Some(&path.join("a.json")), &out, &usual).unwrap(), path.join("a.json"));
     assert!(found().unwrap_err().contains("no calibration in this folder"));
     put("left.yaml");
     put("right.yaml");

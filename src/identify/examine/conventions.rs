@@ -8,6 +8,8 @@
 //! What goes wrong: two faults at once are found one after the other only where each alone brings an improvement. What the target's
 //! unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
 
+use std::iter;
+
 use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, hypotheses, still};
@@ -18,6 +20,7 @@ use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::{Parameter, Robot};
+use crate::tables::names::Unit;
 
 /// Robust scatter of a coordinate, mm, that no built robot has after a fit.
 pub const IMPLAUSIBLE_MM: f64 = 0.8;
@@ -110,11 +113,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         let Some(&(there, hypothesis)) = best.filter(|(there, _)| cut.is_none_or(|cut| there.fitted < cut)) else {
             break;
         };
-        let same: Vec<String> = tried
-            .iter()
-            .filter(|(other, h)| *h != hypothesis && other.is_the_same(&there))
-            .map(|(_, h)| format!(", or, which these readings do not tell apart, {}", h.name()))
-            .collect();
+        let others = tried.iter().filter(|(other, h)| *h != hypothesis && other.is_the_same(&there));
+        let others: Vec<Hypothesis> = others.map(|(_, h)| *h).collect();
+        let same: Vec<String> =
+            others.iter().map(|h| format!(", or, which these readings do not tell apart, {}", h.name())).collect();
         let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
@@ -124,20 +126,22 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         let says = typed.map_or_else(String::new, |unit| format!(" as `--units {}` says", unit.flag()));
         let finding = Finding::new(
             format!("{}{says}{} ({whose} fall from {from:.2} to {to:.3} mm)", hypothesis.name(), same.concat()),
-            match (typed, hypothesis) {
-                (Some(_), Hypothesis::Lengths(.., unit)) => {
-                    format!("`--units {}` says so, if the robot file is the right one", unit.flag())
-                }
-                _ => {
-                    "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)".to_owned()
-                }
-            },
+            action(hypothesis, &others, typed),
         );
-        list.push(finding.about(rows));
+        list.push(Finding { of_joints: hypothesis.is_of_counting(), ..finding.about(rows) });
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
     Mended { set, robot, findings, against, unexplained_mm }
+}
+
+/// What was done about a hypothesis, and what is to be mended, of it or of what is not told apart from it.
+fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>) -> String {
+    if let (Some(_), Hypothesis::Lengths(.., unit)) = (typed, hypothesis) {
+        return format!("`--units {}` says so, if the robot file is the right one", unit.flag());
+    }
+    let mend: Vec<String> = iter::once(&hypothesis).chain(others).map(|hypothesis| hypothesis.mend()).collect();
+    format!("mended for this run; mend {} (`examine = false` in [identify] takes it as it is)", mend.join(", or "))
 }
 
 /// What is said of errors that no hypothesis explains.

@@ -146,6 +146,38 @@ impl Hypothesis {
         }
     }
 
+    /// Whether readings of the joints, in other files too, mean something else than the robot file says.
+    pub fn is_of_counting(self) -> bool {
+        use Hypothesis::{Coupled, Exchanged, Negated, Offset, StandardDh};
+        matches!(self, Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh)
+    }
+
+    /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot file; a table that was written
+    /// otherwise than the controller counts is one of the table.
+    pub fn mend(self) -> String {
+        match self {
+            Hypothesis::Negated(i) => {
+                format!(
+                    "the `sign` of joint {} in the robot file where the controller counts so, else the table",
+                    i + 1
+                )
+            }
+            Hypothesis::Offset(i, deg) => format!(
+                "`theta_deg` of joint {} in the robot file, by {deg:+.0}, where the controller counts so, else the table",
+                i + 1
+            ),
+            // A robot file has no word for it.
+            Hypothesis::Coupled(i, times) => {
+                let ([joint, before], [there, back]) = ([i + 1, i], if times < 0.0 { ['+', '-'] } else { ['-', '+'] });
+                format!(
+                    "the table: joint {joint} as j{joint} {there} j{before}, in targets too, and j{joint} {back} j{before} in what `compensate` writes"
+                )
+            }
+            Hypothesis::StandardDh => "the robot file: `robot import TABLE --dh classic` reads such rows".to_owned(),
+            _ => "the table".to_owned(),
+        }
+    }
+
     /// The set and the robot as they are if it holds.
     pub fn applied(self, set: &Dataset, robot: &Robot) -> (Dataset, Robot) {
         let slides = |joint: usize| set.is_sliding(joint);

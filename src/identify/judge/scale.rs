@@ -89,7 +89,7 @@ impl CommonScale {
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
         match self.is_significant() {
             true => format!(
-                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, or the lengths of the robot file",
+                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, along all axes or one, or the lengths of the robot file",
                 100.0 * sigma
             ),
             false => format!(

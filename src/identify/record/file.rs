@@ -112,7 +112,9 @@ impl Smooth {
 impl Record {
     /// Whether to use the robot, and why not, for its file.
     pub fn check(&self) -> Check {
-        Check { advice: self.advice, reason: self.reason.clone() }
+        let of_joints = self.doctor.iter().filter(|finding| finding.of_joints);
+        let mended = of_joints.map(Finding::sentence).collect();
+        Check { advice: self.advice, reason: self.reason.clone(), mended }
     }
 
     pub fn chosen_method(&self) -> Option<&MethodRecord> {

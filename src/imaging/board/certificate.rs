@@ -258,6 +258,18 @@ impl Board {
         self.symmetry().map_or(vec![0], |step| (0..4).step_by(step).collect())
     }
 
+    /// The place, column and row, that a corner has after the board was turned in its plane by so many quarter turns; a board with unequal sides
+    /// takes half turns only.
+    pub fn turned(&self, (col, row): (usize, usize), quarters: usize) -> (usize, usize) {
+        let (last_col, last_row) = (self.columns() - 1, self.rows() - 1);
+        match quarters % 4 {
+            0 => (col, row),
+            1 => (last_row - row, col),
+            2 => (last_col - col, last_row - row),
+            _ => (row, last_col - col),
+        }
+    }
+
     /// Quarter turns after which the board's outline is the same, whatever its colours: all four of a square board, none and two of another;
     /// none but the first where every corner has a number of its own.
     pub fn turns_of_outline(&self) -> Vec<usize> {

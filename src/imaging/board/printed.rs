@@ -6,7 +6,7 @@
 
 use std::str::FromStr;
 
-use super::certificate::{Board, MOST_STRETCH};
+use super::certificate::{Board, Kind, MOST_STRETCH};
 
 /// Largest error of a caliper over up to 300 mm, mm (DIN 862).
 const CALIPER_MM: f64 = 0.03;
@@ -79,6 +79,31 @@ impl PrintedExtent {
         Ok(Printed { board: Board { square_mm, stretch: board.stretch * height / width, ..scaled }, uncertainty_mm })
     }
 
+    /// A board that was printed smaller or larger as a whole, and how it is then given.
+    fn of_another_scale(&self, board: &Board, scale: [f64; 2], and: &str) -> String {
+        let scale = (scale[0] + scale[1]) / 2.0;
+        let sides = |mm: f64| (mm * scale * 1e3).round() / 1e3;
+        let given = match board.kind {
+            Kind::Checker => format!("`--squares {} --square-mm {}`", board.squares, sides(board.square_mm)),
+            Kind::Charuco { marker_mm, .. } => {
+                format!(
+                    "`--board` with squares of {} mm and markers of {} mm",
+                    sides(board.square_mm),
+                    sides(marker_mm)
+                )
+            }
+            Kind::Tags { gap_mm, .. } => {
+                format!("`--board` with tags of {} mm and gaps of {} mm", sides(board.square_mm), sides(gap_mm))
+            }
+        };
+        let ([width, height], percent) = (self.mm, 100.0 * (scale - 1.0));
+        format!(
+            "a printed extent of {width} x {height} mm is not that of {}: {and}it was printed {percent:+.1} % in size, or has other squares or counts; as it was \
+             printed it is {given}",
+            board.said()
+        )
+    }
+
     /// Why the extent is not the board's.
     fn another(&self, board: &Board, is_exchanged: bool, is_inner: bool) -> String {
         let ([width, height], nominal) = (self.mm, board.extent_mm());
@@ -87,7 +112,15 @@ impl PrintedExtent {
         } else if is_inner {
             "that is the extent of its inner corners: measure from the outer edge of the first square to that of the last".to_owned()
         } else {
-            let percent = [width / nominal[0], height / nominal[1]].map(|scale| 100.0 * (scale - 1.0));
+            let scale = [width / nominal[0], height / nominal[1]];
+            let percent = scale.map(|scale| 100.0 * (scale - 1.0));
+            let turned = [width / nominal[1], height / nominal[0]];
+            if (scale[0] / scale[1] - 1.0).abs() <= MOST_STRETCH {
+                return self.of_another_scale(board, scale, "");
+            }
+            if (turned[0] / turned[1] - 1.0).abs() <= MOST_STRETCH {
+                return self.of_another_scale(board, turned, "width and height are exchanged, and ");
+            }
             format!(
                 "{:+.1} % and {:+.1} %: other counts, another side of the squares, or a print that was not in true size",
                 percent[0], percent[1]
@@ -136,7 +169,10 @@ mod tests {
             (coded, "120.1x150.2", "exchanged"),
             (coded, "120.1x90.2", "inner corners"),
             ("checker:10x8:15", "90.2x120.1", "inner corners"),
-            (coded, "142.5x114", "-5.0 % and -5.0 %"),
+            (coded, "142.5x114", "printed -5.0 % in size"),
+            (coded, "142.5x114", "`--board` with squares of 14.25 mm and markers of 10.45 mm"),
+            ("checker:11x8:20", "213.4x155.2", "`--squares 11x8 --square-mm 19.4`"),
+            ("checker:11x8:20", "155.2x213.4", "width and height are exchanged, and it was printed -3.0 %"),
             (coded, "150x112", "+0.0 % and -6.7 %"),
         ] {
             let said = measured(board, extent).unwrap_err();

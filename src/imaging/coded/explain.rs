@@ -5,7 +5,7 @@
 
 use super::in_grid::markers_in;
 use super::marker::{Fields, TAG_BORDERS, fields};
-use super::numbering::{self, Read, Said};
+use super::numbering::{self, Placement, Read, Said};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
 use crate::imaging::detect::Refusal;
@@ -47,8 +47,11 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal
             format!("shows the markers of a board of {columns}; --board says {said} (columns first, as printed)");
         return Refusal { reason, seen: Some(Board { squares, ..*board }) };
     }
-    if let Said::Place(_) = numbering::place(board, size, &reads) {
-        return format!("shows a board larger than {}: its corners go on beyond those", board.said()).into();
+    if let Said::Place(found) = numbering::place(board, size, &reads) {
+        let reason = format!("shows a board larger than {}: its corners go on beyond those", board.said());
+        let squares = Squares { rows: rows_seen(&found, size), ..board.squares };
+        let is_taller = matches!(board.kind, Kind::Charuco { .. }) && squares.rows > board.squares.rows;
+        return Refusal { reason, seen: is_taller.then_some(Board { squares, ..*board }) };
     }
     let mirrored = grid.flip_rows();
     let is_mirrored = |own| numbering::place(board, size, &markers_in(&mirrored, own)) != Said::Nothing;
@@ -146,14 +149,24 @@ fn other_counts(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<S
         };
         let squares = Squares { columns, rows };
         let Said::Place(found) = numbering::place(&Board { squares, ..*board }, size, reads) else { return None };
-        (found.agreeing >= FEWEST).then_some((found.agreeing, columns))
+        (found.agreeing >= FEWEST).then_some((found.agreeing, columns, rows_seen(&found, size)))
     });
     let first = counts.next()?;
-    let (_, columns) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
-    // Columns and rows are easily said in the wrong order.
-    let exchanged = !matches!(board.kind, Kind::Tags { .. }) && columns == board.squares.rows;
-    let rows = if exchanged { board.squares.columns } else { board.squares.rows };
+    let (_, columns, rows_seen) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+    let rows = match board.kind {
+        Kind::Tags { .. } => board.squares.rows,
+        // Columns and rows are easily said in the wrong order.
+        _ if columns == board.squares.rows => board.squares.columns,
+        // Whoever miscounted the columns may have miscounted the rows: those that are seen are sure.
+        _ => rows_seen,
+    };
     (columns != board.squares.columns).then_some(Squares { columns, rows })
+}
+
+/// Rows of squares from the board's first one to the last of which a grid of `size` corners shows a corner.
+fn rows_seen(found: &Placement, size: (usize, usize)) -> usize {
+    let rows = if found.quarters.is_multiple_of(2) { size.1 } else { size.0 };
+    (found.row + rows as isize + 1).max(2) as usize
 }
 
 /// How many of what was read are markers of a dictionary, in one of the four directions.

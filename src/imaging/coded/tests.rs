@@ -111,7 +111,9 @@ fn the_board_that_it_is_comes_with_the_reason() {
     assert!(board(BOARD).unwrap().has_all_of(&shown) || shown.has_all_of(&board(BOARD).unwrap()), "{shown}");
     assert_eq!(refused(&picture, &BOARD.replace("9x7", "7x9")).seen, board(BOARD));
     assert_eq!(refused(&picture, &BOARD.replace("9x7", "10x7")).seen, board(BOARD));
-    assert_eq!(refused(&picture, &BOARD.replace("9x7", "9x6")).seen, None);
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "9x6")).seen, board(BOARD));
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "10x8")).seen, board(BOARD));
+    assert_eq!(refused(&picture, &BOARD.replace("9x7", "8x6")).seen, board(BOARD));
 }
 
 #[test]

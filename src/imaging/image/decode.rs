@@ -152,6 +152,12 @@ mod tests {
     }
 
     #[test]
+    fn a_format_that_is_not_read_is_named_whatever_the_file_is_called() {
+        let reason = decode(b"RIFF\x24\0\0\0WEBPVP8 \x18\0\0\0", "a.jpg".into(), None).unwrap_err();
+        assert!(reason.contains(UNDECODABLE) && reason.contains("a WEBP file"), "{reason}");
+    }
+
+    #[test]
     fn no_more_is_decoded_than_a_camera_takes() {
         for header in ["P5 100000 100000 255\n", "P5 100000000 1 255\n", "P5 1 50000000 255\n", "P5 65000 65000 255\n"]
         {

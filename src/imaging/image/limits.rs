@@ -8,7 +8,10 @@ use std::io::{BufRead, BufReader, Read, Seek};
 use std::sync::{Condvar, Mutex, PoisonError};
 
 use camino::Utf8Path;
+use image::error::ImageFormatHint;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
+
+use super::pages::pages;
 
 /// What every reason for a file that is no picture says.
 pub const UNDECODABLE: &str = "cannot be decoded";
@@ -31,6 +34,8 @@ pub struct Header {
     pub width: u32,
     /// Height, px.
     pub height: u32,
+    /// Pictures in the file, of which the first is read.
+    pub pages: usize,
     /// Length of the file, bytes.
     file_bytes: u64,
     /// Bytes of its samples once decoded.
@@ -58,9 +63,10 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
     {
         reader.set_format(format);
     }
+    let pages = if reader.format() == Some(ImageFormat::Tiff) { pages(path) } else { 1 };
     let decoder = decoder(reader)?;
     let (width, height) = decoder.dimensions();
-    Ok(Header { width, height, file_bytes, decoded_bytes: decoder.total_bytes() })
+    Ok(Header { pages, width, height, file_bytes, decoded_bytes: decoder.total_bytes() })
 }
 
 /// The decoder of a picture, nothing of which is allocated before what its header announces was checked.
@@ -87,7 +93,13 @@ pub(super) fn undecodable(why: impl std::fmt::Display) -> String {
 pub(super) fn given_up(error: image::ImageError) -> String {
     undecodable(match error {
         image::ImageError::IoError(_) => "the file ends early",
-        image::ImageError::Unsupported(_) => "its format has kinds that are not read, and this is one",
+        image::ImageError::Unsupported(unsupported) => match unsupported.format_hint() {
+            ImageFormatHint::Exact(format) if !format.reading_enabled() => {
+                let name = format.extensions_str().first().copied().unwrap_or("other").to_uppercase();
+                return undecodable(format!("a {name} file, whatever its name says, and no such is read"));
+            }
+            _ => "its format has kinds that are not read, and this is one",
+        },
         _ => "damaged, or of another format than its name says",
     })
 }

@@ -12,6 +12,7 @@ mod integrity;
 mod jpeg_scan;
 mod limits;
 mod mosaic;
+mod pages;
 pub mod pyramid;
 pub mod raster;
 pub mod wide;

@@ -105,7 +105,10 @@ pub(super) fn power_of_ten(exponent: f64, (low, high): (f64, f64)) -> String {
     let value = 10f64.powf(exponent);
     // One digit where it says all: 2e-4, 0.05.
     let digit = value / 10f64.powf((exponent + 1e-9).floor());
-    let more = usize::from((digit - digit.round()).abs() > 1e-6);
+    // As many as neighbours need to differ, which stand a ninth of the axis apart.
+    let apart = (high - low).abs() * std::f64::consts::LN_10 / 9.0;
+    let digits = (-apart.log10()).ceil().clamp(1.0, 6.0) as usize;
+    let more = if (digit - digit.round()).abs() > 1e-6 { digits } else { 0 };
     if PLAIN.contains(&low.min(high)) && PLAIN.contains(&low.max(high)) {
         let decimals = (more as f64 - (exponent + 1e-9).floor()).max(0.0) as usize;
         format!("{value:.decimals$}")
@@ -135,6 +138,7 @@ mod tests {
         assert_eq!(labels((-3.0, 1.2), &[-3.0, -2.0, 0.0, 1.0]), "0.001 0.01 1 10");
         assert_eq!(labels((-1.1, 0.5), &[-0.8, -0.6, -0.2, 0.0, 0.4]), "0.16 0.25 0.63 1 2.5");
         assert_eq!(labels((-5.0, -4.0), &[-4.8, -4.0]), "1.6e-5 1e-4");
+        assert_eq!(labels((-0.86, -0.83), &[-0.855, -0.85, -0.845]), "0.1396 0.1413 0.1429");
         assert_eq!(labels((-2.0, 0.0), &[0.02_f64.log10(), 0.5_f64.log10()]), "0.02 0.5");
     }
 

@@ -105,7 +105,13 @@ fn verdict(record: &Record) -> Markup {
     let (before, after) = (record.before.judged(), record.chosen_method().map(|m| m.quality.judged()));
     let what = if before.point.is_some() { "position" } else { "distance" };
     let after = after.filter(|_| screen::is_corrected(record));
-    let mut numbers = vec![(format!("{} mm", mean(Some(before))), format!("mean {what} error before"))];
+    // With the tool of a file that has none, the error is that tool, and nothing to decide by.
+    let mut numbers = vec![match record.tool_mm {
+        Some((_, left_mm)) => {
+            (format!("{} mm", two_digits(left_mm)), "median error before, its tool fitted".to_owned())
+        }
+        None => (format!("{} mm", mean(Some(before))), format!("mean {what} error before")),
+    }];
     numbers.extend(after.map(|after| (format!("{} mm", mean(Some(after))), format!("mean {what} error after"))));
     if let Some(expected) = &record.expected {
         let p95 = format!("{} mm", two_digits(expected.p95_mm));

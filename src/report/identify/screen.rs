@@ -5,13 +5,26 @@ use camino::Utf8Path;
 use crate::files::OutDir;
 use crate::formats::placements::record::PLACEMENT;
 use crate::identify::judge::errors::Spread;
+use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{Advice, PointSpread, Record};
 use crate::report::table::{Table, number};
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
+use crate::robot::{Joint, Robot};
+
+/// Over less than this, deg, sine and cosine of an angle are a constant and a line to some per cent, and a link's terms are hardly told from a zero's.
+const NARROW_DEG: f64 = 30.0;
+
+/// Half of a joint's limits where its file has none, deg.
+const HALF_A_TURN_DEG: f64 = 180.0;
 
 /// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written, and what to do with it.
-/// `robot` is the nominal robot's file.
-pub fn summary(record: &Record, robot: Option<&Utf8Path>, is_placed: bool, out: &OutDir) -> String {
+/// `robot` is the nominal robot with its file.
+pub fn summary(
+    record: &Record,
+    (robot, nominal): (Option<&Utf8Path>, &Robot),
+    is_placed: bool,
+    out: &OutDir,
+) -> String {
     let errors = |spread| errors(spread, |mm| number(Some(mm), 4));
     let before = record.before.judged();
     let after = record.chosen_method().map(|m| m.quality.judged());
@@ -21,6 +34,7 @@ pub fn summary(record: &Record, robot: Option<&Utf8Path>, is_placed: bool, out: 
     }
     if let Some(expected) = &record.expected {
         lines.push(expected.sentence());
+        lines.extend(known_near(expected, nominal));
     }
     lines.push(String::new());
     lines.push(kept(record));
@@ -77,6 +91,26 @@ pub(super) fn of_tool(record: &Record) -> Option<String> {
     Some(format!(
         "with a tool of {x:.1}, {y:.1}, {z:.1} mm instead of the file's the nominal robot is off by {left:.3} mm (median); `before` has the tool of the file"
     ))
+}
+
+/// Joints but the first, which turns the whole arm, that were bent so little that the robot is known there only.
+fn known_near(expected: &Expected, nominal: &Robot) -> Option<String> {
+    let of_joint = |(j, (joint, [low, high])): (usize, (&Joint, &[f64; 2]))| {
+        let limits = joint
+            .limits_rad
+            .map_or((-HALF_A_TURN_DEG, HALF_A_TURN_DEG), |(low, high)| (low.to_degrees(), high.to_degrees()));
+        let left_out = (low - limits.0).max(limits.1 - high);
+        let is_narrow = j > 0 && !joint.slides && high - low < NARROW_DEG && left_out > high - low;
+        is_narrow.then(|| format!("j{} {low:.0}..{high:.0} deg", j + 1))
+    };
+    let joints: Vec<String> =
+        nominal.joints.iter().zip(&expected.joint_ranges).enumerate().filter_map(of_joint).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "known near these poses only ({}): targets elsewhere need poses there (`stereocal guide poses`)",
+            joints.join(", ")
+        )
+    })
 }
 
 /// Errors of a robot in a line; `mm` writes a length.

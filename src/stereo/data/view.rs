@@ -64,15 +64,7 @@ impl View {
     /// sides takes half turns only.
     pub fn turn(&mut self, board: &Board, side: Side, quarters: usize) {
         for o in self.observations.iter_mut().filter(|o| o.side == side) {
-            let (col, row) = (o.col, o.row);
-            let (last_col, last_row) = (board.columns() - 1, board.rows() - 1);
-            let place = match quarters % 4 {
-                0 => (col, row),
-                1 => (last_row - row, col),
-                2 => (last_col - col, last_row - row),
-                _ => (row, last_col - col),
-            };
-            o.renumber(board, place);
+            o.renumber(board, board.turned((o.col, o.row), quarters));
             if !quarters.is_multiple_of(2) {
                 o.reach.reverse();
             }

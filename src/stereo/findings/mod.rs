@@ -8,8 +8,8 @@
 
 pub mod common_misfit;
 pub mod hypothesis;
+mod one_side;
 pub mod series;
-mod shifted;
 pub mod standing;
 #[cfg(test)]
 mod tests;

@@ -9,7 +9,7 @@
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
-use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, shifted, without_drift};
+use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, without_drift};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
@@ -36,7 +36,7 @@ pub struct Asked {
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let fitting = |corners: &Corners| standing(corners, asked).ok().map(|(found, _)| found.views.len());
-    let (found, mut told) = standing(corners, asked).map_err(|error| shifted::explain(error, corners, fitting))?;
+    let (found, mut told) = standing(corners, asked).map_err(|error| one_side::explain(error, corners, fitting))?;
     let common = common_misfit::look(&found, &told);
     told.extend(common);
     Ok((found, told))

@@ -109,8 +109,8 @@ impl Rig {
         let exchanged = right_mm.x < -right_mm.y.abs().max(right_mm.z.abs());
         exchanged.then(|| {
             format!(
-                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged? Exchange the folders; \
-                 if the cameras are only named so, all is well",
+                "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged, or do both cameras hang \
+                 upside down? Exchange the folders in the first case; of a rig that hangs, or of cameras that are only named so, all is well",
                 -right_mm.x
             )
         })

@@ -83,7 +83,8 @@ fn back(p: Point2<f64>, width: f64, _: f64) -> Point2<f64> {
     Point2::new(p.y, width - 1.0 - p.x)
 }
 
-fn mirror(p: Point2<f64>, width: f64, _: f64) -> Point2<f64> {
+/// A place in a picture so many px wide that is mirrored, left and right.
+pub fn mirror(p: Point2<f64>, width: f64, _: f64) -> Point2<f64> {
     Point2::new(width - 1.0 - p.x, p.y)
 }
 

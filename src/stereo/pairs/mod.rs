@@ -2,7 +2,7 @@
 
 pub mod candidates;
 pub mod discarded;
-mod mixups;
+pub mod mixups;
 mod moved;
 pub mod numbering;
 pub mod open_numbers;

@@ -207,7 +207,11 @@ fn check(
         let agreeing = if none { 0 } else { members.len() };
         if none {
             let missed = |&i: &usize| {
-                let reason = format!("misses the rig of all by {:.1} px", misfits[i].map_or(f64::NAN, |(px, _)| px));
+                let missed_px = misfits[i].map_or(f64::NAN, |(px, _)| px);
+                let reason = match missed_px <= SEVERAL * alone_px {
+                    true => "fits a rig that the others do not fit".to_owned(),
+                    false => format!("misses the rig of all by {missed_px:.1} px"),
+                };
                 Skipped { pair: candidates.views[i].pair.clone(), reason }
             };
             bad.extend(members.iter().map(missed));

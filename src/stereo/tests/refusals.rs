@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::geometry::{Transform, transform};
+use crate::imaging::{Corner, Skipped};
 use crate::stereo::Error;
+use crate::stereo::error::OneSide;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::volume::Extent;
@@ -61,13 +63,16 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
     }
 }
 
+fn asked() -> Asked {
+    Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() }
+}
+
 #[test]
 fn a_series_that_is_shifted_against_the_other_side_is_named() {
     let world = World::new(10, 13);
     for by in [1, 2, 8, 9] {
         let corners = shifted(world.corners(14), by);
-        let asked = Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() };
-        match calibrate_standing(&corners, &asked) {
+        match calibrate_standing(&corners, &asked()) {
             Err(Error::Shifted { fit, of, left, right }) => {
                 let (left, right): (usize, usize) = (left.parse().unwrap(), right.parse().unwrap());
                 // The rights were moved to the front by so many, or to the back by what is left of the ten.
@@ -79,6 +84,48 @@ fn a_series_that_is_shifted_against_the_other_side_is_named() {
             other => panic!("{by}: {:?}", other.map(|(c, _)| c.rms_px)),
         }
     }
+}
+
+/// Boards without a board in some of the pairs: those count for which picture is whose neighbour.
+#[test]
+fn a_shifted_series_with_gaps_is_named_all_the_same() {
+    let mut corners = shifted(World::new(12, 13).corners(14), 1);
+    for name in ["03", "06", "09"] {
+        corners.pairs.retain(|pair| pair.pair != name);
+        corners.skipped.push(Skipped { pair: name.to_owned(), reason: "no board".to_owned() });
+    }
+    match calibrate_standing(&corners, &asked()) {
+        Err(Error::Shifted { fit, of, left, right }) => {
+            assert!(fit >= 4 && of <= 8 && left != right, "{fit} {of} {left} {right}")
+        }
+        other => panic!("{:?}", other.map(|(c, _)| c.rms_px)),
+    }
+}
+
+#[test]
+fn a_side_whose_pictures_are_all_mirrored_or_inverted_is_named() {
+    let world = World::new(9, 13);
+    let clean = world.corners(14);
+    assert!(calibrate_standing(&clean, &asked()).is_ok());
+    let (columns, rows) = (world.board.columns(), world.board.rows());
+    let width = f64::from(world.rig.right.width);
+    let changed = |change: &dyn Fn(&mut Corner)| {
+        let mut corners = clean.clone();
+        for pair in &mut corners.pairs {
+            pair.right.iter_mut().for_each(change);
+            pair.right.sort_by_key(|corner| (corner.row, corner.col));
+        }
+        calibrate_standing(&corners, &asked()).map(|(found, _)| found.rms_px)
+    };
+    let mirrored = changed(&|corner| {
+        corner.px.x = width - 1.0 - corner.px.x;
+        corner.row = rows - 1 - corner.row;
+    });
+    assert!(matches!(mirrored, Err(Error::ChangedSide { what: OneSide::Mirrored, fit: 8.., .. })), "{mirrored:?}");
+    // Of a board that looks the same after half a turn the numbers are open anyway.
+    assert_eq!(world.board.turns_left_open(), [0]);
+    let inverted = changed(&|corner| (corner.col, corner.row) = (columns - 1 - corner.col, rows - 1 - corner.row));
+    assert!(matches!(inverted, Err(Error::ChangedSide { what: OneSide::Inverted, fit: 8.., .. })), "{inverted:?}");
 }
 
 #[test]

@@ -42,6 +42,20 @@ fn readings_that_failed_change_no_choice() {
     }
 }
 
+/// A column of a few words may be the group that is meant; remarks are none.
+#[test]
+fn words_that_part_the_rows_are_listed_where_they_are_not_used() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(40);
+    let numbers = text("", &rows, ",", joined);
+    let labelled = |(k, line): (usize, &str)| format!("{},w{k}x,{line}\n", if k % 2 == 0 { "left" } else { "right" });
+    let table: String = numbers.lines().enumerate().map(labelled).collect();
+    let file = folder.file("parted.csv", format!("station,remark,J1,J2,J3,J4,J5,J6,X,Y,Z\n{table}"));
+    let (found, said) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+    assert_eq!(found.len(), rows.len());
+    assert!(said[0].ends_with("; not used: station"), "{said:?}");
+}
+
 #[test]
 fn three_angles_beside_a_point_are_no_second_target() {
     let folder = Folder(workplace());

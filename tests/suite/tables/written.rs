@@ -185,6 +185,11 @@ fn files_that_are_no_tables_are_said_to_be() {
         "{\"robot\": \"R\", \"poses\": [{\"q\": [1, 2]}, {\"q\": [3, 4]}], \"cameras\": [{\"f\": 1}]}",
         &["a JSON file", "json_normalize(json.load(open('a.json')), record_path=['poses']).to_csv"],
     );
+    said(
+        "frame.json",
+        "{\"j1\": {\"0\": 1.5, \"1\": 2.5}, \"x\": {\"0\": 10.0, \"1\": null}}",
+        &["a JSON file", "`import pandas; pandas.read_json('frame.json').to_csv"],
+    );
     said("b.txt", "[{\"q\": 1}, {\"q\": 2}]", &["a JSON file", "json_normalize(json.load(open('b.txt')))"]);
     said("c.json", "{\"a\": {\"q\": 1}, \"b\": {\"q\": 2}}", &["list(json.load(open('c.json')).values())"]);
     said("d.json", "{\"q1\": [1, 2], \"x\": [3, 4]}", &["pandas.DataFrame(json.load(open('d.json')))"]);

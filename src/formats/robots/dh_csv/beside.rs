@@ -1,9 +1,10 @@
-//! What a joint may have beside its parameters: `beta_deg`, and limits.
+//! What a joint may have beside its parameters: `beta_deg`, limits, and whether it slides.
 
 use super::names::plain;
 use super::table::Table;
 use super::units::TWO_TURNS;
 use crate::files::Result;
+use crate::tables::Fields;
 use crate::tables::names::{self, Unit};
 
 /// The least and the largest angle of a joint.
@@ -11,16 +12,39 @@ pub(super) type Limits = (f64, f64);
 
 pub(super) struct Beside {
     pub beta_deg: Vec<Option<f64>>,
+    /// Of a joint that slides as they stand there.
     pub limits_deg: Vec<Option<Limits>>,
+    pub slides: Vec<bool>,
     /// Columns with numbers that nothing was read of.
     pub left_out: Vec<String>,
 }
 
-/// Limits in degrees: in radians where they say so, or none is beyond two turns.
-pub(super) fn in_deg(limits: &mut [Option<Limits>], stated: Option<Unit>) {
-    let largest = limits.iter().flatten().map(|(low, high)| low.abs().max(high.abs())).fold(0.0, f64::max);
+/// Limits in degrees: in radians where they say so, or none is beyond two turns. Those of joints that slide stay as they are.
+pub(super) fn in_deg(limits: &mut [Option<Limits>], slides: &[bool], stated: Option<Unit>) {
+    let mut turning: Vec<&mut Limits> = limits
+        .iter_mut()
+        .zip(slides)
+        .filter(|(_, slides)| !**slides)
+        .filter_map(|(limits, _)| limits.as_mut())
+        .collect();
+    let largest = turning.iter().map(|(low, high)| low.abs().max(high.abs())).fold(0.0, f64::max);
     if stated.map_or(largest <= TWO_TURNS, |unit| unit == Unit::Rad) {
-        limits.iter_mut().flatten().for_each(|(low, high)| (*low, *high) = (low.to_degrees(), high.to_degrees()));
+        turning.iter_mut().for_each(|(low, high)| (*low, *high) = (low.to_degrees(), high.to_degrees()));
+    }
+}
+
+/// Whether a column says of each joint that it turns or slides.
+fn is_of_kind(name: &str) -> bool {
+    let words = plain(name).0;
+    matches!(&words.iter().map(String::as_str).collect::<Vec<_>>()[..], ["type" | "kind" | "sigma" | "jointtype"])
+}
+
+/// Whether a joint slides, in the words of tables; sigma of the Robotics Toolbox is 1 where it does.
+fn slides(cell: &str) -> Option<bool> {
+    match cell.trim().trim_matches(['"', '\'']).to_lowercase().as_str() {
+        "revolute" | "rotary" | "rotational" | "rot" | "r" | "0" => Some(false),
+        "prismatic" | "linear" | "sliding" | "translational" | "p" | "1" => Some(true),
+        _ => None,
     }
 }
 
@@ -51,6 +75,8 @@ impl Table<'_> {
         };
         let beta = only(&|name| name.eq_ignore_ascii_case("beta_deg"));
         let bounds = only(&|name| side(name) == Some(-1)).zip(only(&|name| side(name) == Some(1)));
+        let kind = only(&|name| is_of_kind(name));
+        let slides = self.sliding(kind)?;
         let (mut beta_deg, mut limits_deg) = (Vec::new(), Vec::new());
         for (line, row) in self.rows {
             let of = |column: Option<usize>| match column.filter(|&c| !row[c].is_empty()) {
@@ -67,8 +93,10 @@ impl Table<'_> {
                 _ => None,
             });
         }
-        in_deg(&mut limits_deg, bounds.and_then(|(low, _)| plain(&names[low]).1));
-        let read = |c: usize| columns.contains(&c) || beta == Some(c) || bounds.is_some_and(|b| b.0 == c || b.1 == c);
+        in_deg(&mut limits_deg, &slides, bounds.and_then(|(low, _)| plain(&names[low]).1));
+        let read = |c: usize| {
+            columns.contains(&c) || [beta, kind].contains(&Some(c)) || bounds.is_some_and(|b| b.0 == c || b.1 == c)
+        };
         let numbers = |c: usize| {
             let is_number =
                 |cell: &str| cell.contains(|c: char| c.is_ascii_digit()) && !cell.contains(|c: char| c.is_alphabetic());
@@ -76,6 +104,23 @@ impl Table<'_> {
         };
         let left_out = (0..names.len()).filter(|&c| !read(c) && !names[c].is_empty() && names[c] != "-" && numbers(c));
         let left_out = left_out.map(|c| names[c].clone()).collect();
-        Ok(Beside { beta_deg, limits_deg, left_out })
+        Ok(Beside { beta_deg, limits_deg, slides, left_out })
+    }
+
+    /// Which rows are of joints that slide. A column of other words, of motors for one, says nothing of it.
+    fn sliding(&self, kind: Option<usize>) -> Result<Vec<bool>> {
+        let of_row = |(_, row): &(u64, Fields)| kind.and_then(|column| slides(&row[column]));
+        let said: Vec<Option<bool>> = self.rows.iter().map(of_row).collect();
+        let unknown = said.iter().position(Option::is_none).filter(|_| said.iter().any(Option::is_some));
+        if let (Some(at), Some(column)) = (unknown, kind) {
+            let (line, row) = &self.rows[at];
+            let message = format!("joint {} is `{}`, neither revolute nor prismatic", at + 1, &row[column]);
+            return Err(self.grid.refuse(
+                *line,
+                message,
+                Some("a word for each row: revolute (R, 0) or prismatic (P, 1)"),
+            ));
+        }
+        Ok(said.into_iter().map(|slides| slides == Some(true)).collect())
     }
 }

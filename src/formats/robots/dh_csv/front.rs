@@ -198,7 +198,7 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     found.limits_deg = links.limits.iter().map(|limits| limits.map(|[low, high]| (low.number, high.number))).collect();
     found.limits_deg.truncate(found.rows.len());
     found.limits_deg.iter_mut().for_each(|limits| *limits = limits.filter(|(low, high)| low < high));
-    beside::in_deg(&mut found.limits_deg, radians.then_some(Unit::Rad));
+    beside::in_deg(&mut found.limits_deg, &found.slides, radians.then_some(Unit::Rad));
     if links.limited && found.limits_deg.iter().any(Option::is_none) {
         found.said.push_str(", left out: qlim");
     }

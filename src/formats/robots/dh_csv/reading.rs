@@ -26,7 +26,9 @@ pub struct Reading {
     pub(super) flange: Vec<Row>,
     /// Other columns, of a table with names.
     pub(super) beta_deg: Vec<Option<f64>>,
+    /// Of joints that slide in mm.
     pub(super) limits_deg: Vec<Option<Limits>>,
+    pub(super) slides: Vec<bool>,
     /// What was taken, for a sentence.
     pub said: String,
     /// The columns' names in their order, as `--columns` has them.
@@ -50,6 +52,10 @@ impl Reading {
         for (joint, (beta, limits)) in robot.joints.iter_mut().zip(self.beta_deg.iter().zip(&self.limits_deg)) {
             joint.beta_rad = beta.map_or(0.0, f64::to_radians);
             joint.limits_rad = limits.map(|(low, high)| (low.to_radians(), high.to_radians()));
+        }
+        let sliding = robot.joints.iter_mut().zip(self.limits_deg.iter().zip(&self.slides));
+        for (joint, (limits, _)) in sliding.filter(|(_, (_, slides))| **slides) {
+            (joint.slides, joint.limits_rad) = (true, *limits);
         }
         if !self.flange.is_empty() {
             let held = from_rows(name, convention, &self.flange);
@@ -126,9 +132,15 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
         *row = [alpha.converted(row[0]), a.converted(row[1]), theta.converted(row[2]), d.converted(row[3])];
     }
     let flange = rows.split_off(joints);
-    let Beside { mut beta_deg, mut limits_deg, left_out } = table.beside(columns)?;
+    let Beside { mut beta_deg, mut limits_deg, mut slides, left_out } = table.beside(columns)?;
     beta_deg.truncate(joints);
     limits_deg.truncate(joints);
+    slides.truncate(joints);
+    let sliding: Vec<String> = (1..).zip(&slides).filter(|(_, slides)| **slides).map(|(j, _)| j.to_string()).collect();
+    for (low, high) in limits_deg.iter_mut().zip(&slides).filter(|(_, slides)| **slides).filter_map(|(l, _)| l.as_mut())
+    {
+        (*low, *high) = (d.converted(*low), d.converted(*high));
+    }
     // `a(i-1)`, `alpha_{i-1}`: those of the link before.
     let before = |name: &String| {
         let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
@@ -147,6 +159,9 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     };
     let (angle, length) = (word(alpha, theta), word(a, d));
     let mut said = format!("{joints} joints; columns {columns}, angles in {angle}, lengths in {length}");
+    if !sliding.is_empty() {
+        let _ = write!(said, ", sliding: {}", sliding.join(", "));
+    }
     if names.is_none() {
         said.push_str(", no header");
     }
@@ -157,5 +172,5 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
         let _ = write!(said, ", left out: {}", left_out.join(", "));
     }
     let (words, open) = (table.words.convention, angles_open.or(lengths_open));
-    Ok(Reading { rows, flange, beta_deg, limits_deg, said, columns, stated, words, calls: false, own, open })
+    Ok(Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, stated, words, calls: false, own, open })
 }

@@ -70,7 +70,8 @@ impl Table<'_> {
                 if value.variable && which != 2 {
                     let message =
                         format!("`{}`: the joint's variable is {}, so the joint slides", &row[column], NAMES[which]);
-                    let hint = "a table has turning joints alone; `robot import` takes a sliding one from a URDF";
+                    let hint =
+                        "write its offset there, and a column `type` that says revolute or prismatic of each joint";
                     return Err(self.grid.refuse(*line, message, Some(hint)));
                 }
                 radians |= value.radians && matches!(which, 0 | 2);

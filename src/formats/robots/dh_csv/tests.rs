@@ -169,6 +169,26 @@ fn a_last_row_that_holds_still_is_the_flange() {
 }
 
 #[test]
+fn a_joint_that_slides_is_read_from_its_words() {
+    let table = "alpha_deg,a_mm,theta_deg,d_mm,type,min,max\n0,225,0,387,R,-90,90\n180,175,0,0,R,-90,90\n0,0,0,0,P,0,150\n0,0,0,60,R,-90,90\n";
+    let number = |kind: &str| if kind == ",P" { ",1" } else { ",0" };
+    let sigma = [",R", ",P"].iter().fold(table.replace("type", "sigma"), |text, kind| text.replace(kind, number(kind)));
+    let words = table.replace(",R", ",revolute").replace(",P", ",Prismatic").replace("type", "Joint type");
+    for table in [table, &sigma, &words] {
+        let found = one("dh.csv", table);
+        assert!(found.said.contains(", sliding: 3"), "{}", found.said);
+        let joints = found.robot("scara", Convention::Classic).joints;
+        let slides: Vec<bool> = joints.iter().map(|joint| joint.slides).collect();
+        assert_eq!(slides, [false, false, true, false], "{table}");
+        assert_eq!((joints[2].limits_rad, joints[0].limits_rad.unwrap().1), (Some((0.0, 150.0)), 90f64.to_radians()));
+    }
+    // Other words say nothing of it, and one that is neither is named.
+    let motors = one("dh.csv", &table.replace(",R", ",AC").replace(",P", ",DC"));
+    assert!(!motors.said.contains("sliding") && motors.slides == [false; 4], "{}", motors.said);
+    assert!(said("dh.csv", &table.replace(",P", ",Q")).contains("joint 3 is `Q`, neither revolute nor prismatic"));
+}
+
+#[test]
 fn limits_are_read_or_said_to_be_left_out() {
     let table = "joint,a,alpha,d,theta,q_min,q_max\n1,0,90,400,0,-170,170\n2,560,0,0,90,-90,90\n3,35,90,0,0,-80,80\n";
     assert_eq!(one("dh.csv", table).limits_deg, [Some((-170.0, 170.0)), Some((-90.0, 90.0)), Some((-80.0, 80.0))]);

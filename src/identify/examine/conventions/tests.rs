@@ -68,6 +68,18 @@ fn what_a_fit_swallows_where_joints_move_little_is_named() {
 }
 
 #[test]
+fn what_is_to_be_mended_is_named_with_its_file() {
+    let (world, rows) = one_sphere(8.0, 1);
+    let found =
+        |rows: &[Measurement]| examine(&Dataset::new(rows).unwrap(), &world.nominal, &Settings::default()).findings;
+    assert!(found(&rows).is_empty());
+    let negated = found(&joints(&rows, |q| q[3] = -q[3]));
+    assert!(negated[0].of_joints && negated[0].action.contains("`sign` of joint 4 in the robot file"), "{negated:?}");
+    let lagging = found(&late(&rows));
+    assert!(!lagging[0].of_joints && lagging[0].action.contains("mend the table"), "{lagging:?}");
+}
+
+#[test]
 fn sessions_a_target_elsewhere_and_gross_errors_are_no_convention() {
     let (world, rows) = one_sphere(8.0, 1);
     for step_mm in [0.5, 3.0, 10.0, 50.0] {
