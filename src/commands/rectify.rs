@@ -306,20 +306,20 @@ mod tests {
 
     #[test]
     fn boards_that_common_rows_lose_are_said() {
-        let camera = Camera::pinhole(640, 480, 600.0);
+        let camera = Camera::pinhole(1280, 720, 640.0);
         let lost_by = |turn: f64, right_mm: Vector3<f64>| {
             let left_from_right = transform(Vector3::new(0.0, turn, 0.0), right_mm);
             let rig = Rig { left: camera, right: camera, right_from_left: left_from_right.inverse(), covariance: None };
-            let corners = [(220.0, 140.0), (420.0, 140.0), (420.0, 340.0), (220.0, 340.0)];
+            let corners = [(690.0, 290.0), (840.0, 290.0), (840.0, 580.0), (690.0, 580.0)];
             let outline = Hull::of(corners.map(|(x, y)| Point2::new(x, y)));
             let volume =
-                Volume { left_px: outline.clone(), right_px: outline, depth_mm: [480.0, 520.0], tilt_deg: [0.0; 4] };
+                Volume { left_px: outline.clone(), right_px: outline, depth_mm: [800.0, 1200.0], tilt_deg: [0.0; 4] };
             lost(&volume, &rig, &Matrices::new(&rig, Scaling::OPENCV).unwrap())
         };
         assert_eq!(lost_by(0.0, Vector3::new(60.0, 0.0, 0.0)), None);
         assert_eq!(lost_by(-0.2, Vector3::new(100.0, 0.0, 10.0)), None);
         // Far round the board, and far in front of the other.
-        let said = lost_by(-0.84, Vector3::new(370.0, 0.0, 170.0)).unwrap();
-        assert!(said.contains("500 mm away"), "{said}");
+        let said = lost_by(0.83, Vector3::new(-520.0, 0.0, 290.0)).unwrap();
+        assert!(said.contains("1000 mm away"), "{said}");
     }
 }

@@ -18,8 +18,8 @@ use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::Cause;
 use crate::stereo::pairs::series::{Missed, TIMES};
-use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty;
+use crate::stereo::solve::{Priors, Problem};
 
 /// Pairs that are named as the worst.
 const WORST: usize = 5;
@@ -102,7 +102,12 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     let [left, right] = Side::BOTH.map(|side| calibration.layout.lens(side).map(|lens| lens.max(Lens::Brown5)));
     let layout = Layout { left, right, ..calibration.layout };
     // What a richer lens takes up is not the board's.
-    let problem = refitted(&calibration.problem(), &layout)?;
+    let mut problem = calibration.problem();
+    if calibration.known_sides == [false; 2] && problem.priors.know_lenses() {
+        // What each camera alone says of its lens has the board's error in it.
+        problem.priors = Priors::of_rig(calibration.rig(), calibration.board.diagonal_mm());
+    }
+    let problem = refitted(&problem, &layout)?;
     let before_px = median_px(&problem)?.min(misfit.usual_px);
     let (stretch, fitted) = likeliest_stretch(&problem, &layout)?;
     let left_px = median_px(&fitted)?;

@@ -30,8 +30,13 @@ pub fn choose(start: &Problem, missed: Missed, board: &Board, options: &Options)
     if !missed.is_better_alone() {
         return of_pairs;
     }
+    let of = |Choice { layout, near, priors, .. }: &Choice| {
+        let values = near.clone().unwrap_or_else(|| start.values.clone());
+        Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout).ok()
+    };
     let lens = of_pairs.as_ref().ok().and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
-    let Some(known) = each_alone::lenses(start, board, lens, missed) else { return of_pairs };
+    let paired = of_pairs.as_ref().ok().and_then(of);
+    let Some(known) = each_alone::lenses(start, board, lens, paired.as_ref(), missed) else { return of_pairs };
     let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
     Ok(Choice { scores, ..known_lenses::choose(start, board, &known, options)? })
 }

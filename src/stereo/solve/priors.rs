@@ -142,6 +142,11 @@ impl Priors {
         priors
     }
 
+    /// Whether lenses are known, not what lenses usually are.
+    pub fn know_lenses(&self) -> bool {
+        self.all.iter().any(|expectation| expectation.known)
+    }
+
     /// Sum of the logarithms of the standard deviations of those numbers that a richer layout has and a simpler one has not.
     pub fn log_width(&self, richer: &Layout, simpler: &Layout) -> f64 {
         let free = |layout: &Layout, expectation: &&Expectation| {
