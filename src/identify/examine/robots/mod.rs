@@ -11,6 +11,7 @@
 //! parts, which looks like another robot.
 
 mod fit;
+pub(super) mod loads;
 pub(super) mod tools;
 
 use rayon::prelude::*;
@@ -205,6 +206,7 @@ impl Table {
             points_mm: rows.iter().map(point).collect::<Option<Vec<_>>>()?,
             groups: rows.iter().map(|&row| set.poses[row].group).collect(),
             tools: Vec::new(),
+            loaded: Vec::new(),
         };
         Some(Table { rows, points })
     }
