@@ -2,7 +2,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::identify::examine::robots::tools;
+use crate::identify::data::dataset::Pose;
+use crate::identify::examine::robots::{self, tools};
 use crate::identify::examine::sessions;
 use crate::identify::settings::Settings;
 use crate::identify::synthetic::{normal, planned, row, seen_at, sensor};
@@ -80,4 +81,39 @@ fn a_load_from_some_row_on_is_named_where_it_makes_sessions() {
         }
     }
     assert!(named >= 2, "{named} of 4");
+}
+
+/// Files of one robot under the loads that these turns a metre of lever are of.
+fn files(loads: &[f64], seed: u64) -> (Dataset, Robot) {
+    let tables: Vec<(Dataset, Robot)> =
+        loads.iter().zip(0..).map(|(&k, i)| table(&vec![true; 50], k, 0.0, seed + 10 * i)).collect();
+    let (mut set, robot) = tables[0].clone();
+    set.poses.clear();
+    set.groups.clear();
+    for (k, (table, _)) in tables.into_iter().enumerate() {
+        set.groups.extend(table.groups);
+        set.poses.extend(table.poses.into_iter().map(|pose| {
+            let name = format!("{}:{}", k + 1, pose.name);
+            Pose { group: k, name, ..pose }
+        }));
+        set.files.push(format!("load_{}.csv", k + 1));
+    }
+    (set, robot)
+}
+
+#[test]
+fn files_under_other_loads_are_told_and_those_under_one_are_not() {
+    for (seed, k_rad_per_m) in [(1, 2e-3), (2, 5e-3), (3, 1e-2)] {
+        let (set, robot) = files(&[0.0, k_rad_per_m, 2.0 * k_rad_per_m], seed);
+        let (whole, tool) = (robots::find(&set, &robot, &Settings::default()), tools::find(&set, &robot));
+        let said = robots::of_files(&set, &robot).map(|finding| finding.finding);
+        assert!(whole.is_some() || tool.is_some() || said.is_some(), "{k_rad_per_m}");
+        if let Some(said) = said {
+            assert!(said.contains("load_1.csv") && said.contains("load_3.csv"), "{said}");
+        }
+        for same in [0.0, k_rad_per_m] {
+            let (set, robot) = files(&[same, same, same], seed);
+            assert_eq!(robots::of_files(&set, &robot), None, "{same}");
+        }
+    }
 }
