@@ -140,7 +140,7 @@ fn tables_beside_the_longest_are_named_by_their_lines() {
         format!("def {name}():\n return np.array([\n{rows} ])\n\n")
     };
     for (joints, others) in
-        [(vec![7, 6], vec![12]), (vec![6, 7, 4], vec![3, 22]), (vec![2, 7], vec![]), (vec![7], vec![])]
+        [(vec![7, 6], vec![14]), (vec![6, 7, 4], vec![3, 24]), (vec![2, 7], vec![]), (vec![7], vec![])]
     {
         let text: String = joints.iter().enumerate().map(|(k, n)| arm(&format!("arm_{k}"), *n)).collect();
         let matrix = table(&text).unwrap().unwrap();

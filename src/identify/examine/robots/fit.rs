@@ -56,6 +56,9 @@ pub(super) struct Points {
     pub(super) loaded: Vec<bool>,
 }
 
+/// Changes the weights of all rows by their errors, mm.
+type Weigh<'a> = dyn FnMut(&[Vector3<f64>], &mut [f64]) + 'a;
+
 /// What a fit leaves.
 #[derive(Debug, Clone)]
 pub(super) struct Left {
@@ -149,7 +152,7 @@ impl Points {
         mut x: DVector<f64>,
         steps: usize,
         mut weights: Vec<f64>,
-        weigh: &mut dyn FnMut(&[Vector3<f64>], &mut [f64]),
+        weigh: &mut Weigh,
     ) -> (Left, DVector<f64>) {
         let kinematics: Vec<Kinematics> = parts.iter().map(|part| self.kinematics(part)).collect();
         let (mut left, mut step) = self.at(parts, &kinematics, &x, &weights, FIRST_MM);

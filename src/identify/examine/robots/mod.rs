@@ -131,8 +131,10 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots>
 
 /// What is said of files of which each has far less error by itself than with the others, though no tool and no placement tells them apart.
 pub(super) fn of_files(set: &Dataset, robot: &Robot) -> Option<Finding> {
-    let table = Table::new(set, robot)?;
+    let mut table = Table::new(set, robot)?;
     let files = Some(table.files(set)).filter(|files| files.len() > 1)?;
+    // What the links lack of a load, every robot has of its own.
+    table.points = table.points.with_load(Vec::new());
     let (parts, compared) = table.judged(files, 1, Table::compared_as_one)?;
     let parts = table.parts(set, &parts, &compared);
     Some(Finding::new(
