@@ -3,7 +3,7 @@
 //! In: the fitted rows, and the robot of the file. Out: which rows are under the load, where they come in any order. Method: each joint turns by
 //! a compliance of its own times the torque that a weight at the target has about it. The rows whose errors have most of that are under the load at
 //! first, and then those that it brings nearer, until no row changes. One robot with the load in these rows is held against one with the load in
-//! all of them and in none, by Fisher's test and by what is left, as of robots. Goes wrong: loads that move the target by less than about three
+//! all of them and in none, by Fisher's test and by what is left, as of robots. Goes wrong: a state of a third of the rows or fewer, loads that move the target by less than about three
 //! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder.
 
 use nalgebra::Vector3;
