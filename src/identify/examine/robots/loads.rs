@@ -3,7 +3,7 @@
 //! In: the fitted rows, and the robot of the file. Out: which rows are under the load, where they come in any order. Method: each joint turns by
 //! a compliance of its own times the torque that a weight at the target has about it. The rows whose errors have most of that are under the load at
 //! first, and then those that it brings nearer, until no row changes. One robot with the load in these rows is held against one with the load in
-//! all of them and in none, by Fisher's test and by what is left, as of robots. Goes wrong: a state of a third of the rows or fewer, loads that move the target by less than about three
+//! all of them and in none, by Fisher's test and by what is left, as of robots. Goes wrong: loads that move the target by less than about three
 //! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder.
 
 use nalgebra::Vector3;
@@ -37,12 +37,19 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
     let table = Table::new(set, robot)?;
     let points = &table.points;
     let rows: Vec<usize> = (0..table.rows.len()).collect();
-    let weights = points.without_gross(std::slice::from_ref(&rows));
-    let (always, along) = points.with_load(vec![true; rows.len()]).under_load(&rows, &weights);
-    let never = points.together(std::slice::from_ref(&rows), &weights);
-    let start = by_amount(&never.errors_mm, &along);
-    let least = if always.scatter_mm() < never.scatter_mm() { always } else { never };
-    let States { loaded, left, moved_mm } = settled(points, &weights, start, BEATS.recip() * least.scatter_mm())?;
+    let least_of = |weights: &[f64]| {
+        let (always, along) = points.with_load(Vec::new()).under_load(&rows, weights);
+        let never = points.together(std::slice::from_ref(&rows), weights);
+        let start = by_amount(&never.errors_mm, &along);
+        (if always.scatter_mm() < never.scatter_mm() { always } else { never }, start)
+    };
+    // A gross error for one state may be of the other: they are left out once there are two.
+    let mut weights = vec![1.0; rows.len()];
+    let (least, start) = least_of(&weights);
+    let rough = settled(points, &weights, start, BEATS.recip() * least.scatter_mm())?;
+    rough.left.leave_out_gross(&rows, &mut weights);
+    let (least, _) = least_of(&weights);
+    let States { loaded, left, moved_mm } = settled(points, &weights, rough.loaded, f64::INFINITY)?;
     let of_state = |state: bool| rows.iter().copied().filter(|&row| loaded[row] == state).collect::<Vec<usize>>();
     let (with, without) = (of_state(true), of_state(false));
     let other = if with.len() < without.len() { with } else { without };

@@ -40,7 +40,7 @@ fn which(loaded: &[bool], state: bool) -> Vec<String> {
 
 #[test]
 fn loads_in_rows_in_any_order_are_told_with_the_rows() {
-    for (seed, k_rad_per_m, every) in [(1, 1e-3, 2), (2, 3e-3, 2)] {
+    for (seed, k_rad_per_m, every) in [(1, 1e-3, 2), (2, 3e-3, 2), (3, 3e-3, 3), (4, 2e-3, 3)] {
         for count in [60, 120] {
             let loaded: Vec<bool> = (0..count).map(|i| i % every == 0).collect();
             let (set, robot) = table(&loaded, k_rad_per_m, 0.0, seed);
