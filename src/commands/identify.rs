@@ -63,7 +63,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;
-    record.rows = Given::new(&rows);
+    record.rows = Given::new(&rows).with_mended(as_mended(&set));
     said(&record, &out, args.output.json);
     let placed = found.placed(&set, &nominal, &settings)?;
     let json = write(&out, &set, &nominal, &found, &record, placed.as_ref(), &settings)?;
@@ -167,6 +167,15 @@ pub fn read(source: &Source, robot: &Robot) -> Result<Vec<Measurement>> {
         check_joints(robot, &rows, path)?;
     }
     Ok(rows)
+}
+
+/// Role, joints (deg, or mm) and point of each row.
+fn as_mended(set: &Dataset) -> impl Iterator<Item = (Role, Vec<f64>, [f64; 3])> + '_ {
+    let reading = |(j, q): (usize, &f64)| if set.is_sliding(j) { *q } else { q.to_degrees() };
+    set.poses.iter().filter_map(move |pose| {
+        let joints = pose.joints_rad.iter().enumerate().map(reading).collect();
+        Some((pose.role, joints, pose.reading.point_mm()?.into()))
+    })
 }
 
 /// What stands beside the measurements.

@@ -267,7 +267,10 @@ impl Taken<'_> {
         let picked = &self.way.picked;
         let taken: Vec<At> = picked.columns().chain(picked.distance).chain(self.own().into_values()).collect();
         let mut left = Vec::new();
-        for (part, file) in self.parts.iter().enumerate().filter(|(_, p)| !p.is_program()) {
+        let whole = |part: usize| self.parts.len() > 1 && taken.iter().all(|at| at.part != part);
+        let idle = (0..self.parts.len()).filter(|&part| whole(part));
+        left.extend(idle.map(|part| format!("all of {}", self.parts[part].file_name())));
+        for (part, file) in self.parts.iter().enumerate().filter(|(part, p)| !p.is_program() && !whole(*part)) {
             let is_left = |column: &usize| {
                 let at = At { part, column: *column };
                 let is_told = match file.kinds[*column] {

@@ -32,6 +32,15 @@ impl Given {
         Given { fitted: words(false), verify: words(true) }
     }
 
+    /// The same with rows as they were mended, by which a file is known that was mended since: role, joints (deg, or mm), and point (mm).
+    pub fn with_mended(mut self, rows: impl IntoIterator<Item = (Role, Vec<f64>, [f64; 3])>) -> Given {
+        for (role, joints_deg, point_mm) in rows {
+            let list = if role == Role::Verify { &mut self.verify } else { &mut self.fitted };
+            list.insert(word_of(&joints_deg, &point_mm));
+        }
+        self
+    }
+
     /// Whether a row is one of those that may have been fitted.
     pub fn fitted(&self, row: &Measurement) -> bool {
         word(row).is_some_and(|word| self.fitted.contains(&word))
@@ -50,10 +59,14 @@ fn word(row: &Measurement) -> Option<String> {
         Observed::Distance { distance_mm, .. } => vec![*distance_mm],
         Observed::Missing { .. } => return None,
     };
+    Some(word_of(&row.at.joints_deg, &reading))
+}
+
+fn word_of(joints_deg: &[f64], reading: &[f64]) -> String {
     // No zero has a sign.
     let rounded = |number: &f64| format!("{:.0} ", (1000.0 * number).round() + 0.0);
-    let numbers: String = row.at.joints_deg.iter().chain(&reading).map(rounded).collect();
-    Some(sha256(numbers.as_bytes()).chars().take(DIGITS).collect())
+    let numbers: String = joints_deg.iter().chain(reading).map(rounded).collect();
+    sha256(numbers.as_bytes()).chars().take(DIGITS).collect()
 }
 
 #[cfg(test)]
@@ -86,6 +99,10 @@ mod tests {
         renamed.at.pose = "other".to_owned();
         assert!(given.fitted(&renamed) && given.holds(&renamed));
         assert!(given.holds(&row(2.0, 6.0, Role::Sample)) && !given.fitted(&row(2.0, 6.0, Role::Sample)));
+        // A row that was mended is known as it was and as it is.
+        let mended = given.clone().with_mended([(Role::Sample, vec![3.0, 0.0], [7.0, 2.0, 3.0])]);
+        let sample = row(3.0, 7.0, Role::Sample);
+        assert!(mended.fitted(&sample) && mended.fitted(&renamed) && !given.holds(&sample));
         // The same pose measured anew, and another pose with the same reading.
         assert!(!given.holds(&row(1.0, 5.01, Role::Sample)) && !given.holds(&row(1.1, 5.0, Role::Sample)));
     }

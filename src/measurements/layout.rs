@@ -19,6 +19,9 @@ const MOST_FREE: usize = 60;
 /// deviations in the middle of all rows, and half of them differ from that by more than 0.46: three tenths of it.
 const RIGID: f64 = 0.05;
 
+/// Numbers of a transform but for its last row, which says nothing.
+const TRANSFORM: usize = 12;
+
 /// What rounding leaves of a rotation's rows that are at right angles and of length one.
 const ROUNDED: f64 = 2e-3;
 
@@ -85,7 +88,7 @@ fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> 
 fn translation(parts: &[Part], first: At) -> Option<[At; 3]> {
     let at = |entry: usize| At { column: first.column + entry, ..first };
     let file = &parts[first.part];
-    if first.column + 12 > file.width() {
+    if first.column + TRANSFORM > file.width() {
         return None;
     }
     let turn = |row: usize| point(parts, row, &[at(0), at(1), at(2)]).zip(point(parts, row, &[at(4), at(5), at(6)]));
@@ -112,7 +115,16 @@ fn blocks(parts: &[Part], free: &[Vec<At>], count: usize, known: bool) -> Vec<Ve
     }
     // What stands between columns that have names is no joint.
     let apart = |window: &&[At]| !parts[window[0].part].is_named() || beside(window);
-    free.iter().flat_map(|of| of.windows(count).filter(apart).map(<[At]>::to_vec)).collect()
+    // Nor are entries of a rotation.
+    let turns = |at: &At| {
+        let starts = (0..=at.column).rev().take(TRANSFORM).map(|column| At { column, ..*at });
+        starts.filter(|first| free[at.part].contains(first)).any(|first| translation(parts, first).is_some())
+    };
+    let of_file = |of: &Vec<At>| {
+        let of: Vec<At> = of.iter().copied().filter(|at| !turns(at)).collect();
+        of.windows(count).filter(apart).map(<[At]>::to_vec).collect::<Vec<_>>()
+    };
+    free.iter().flat_map(of_file).collect()
 }
 
 /// Whether two points are at other distances from row to row.
@@ -149,4 +161,45 @@ pub(super) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
     let mean = |v: Vec<f64>| v.iter().sum::<f64>() / v.len().max(1) as f64;
     let within = mean((0..rows).filter_map(|row| apart(at(row, first), at(row, second))).collect());
     within < ONE_POINT * mean((1..rows).filter_map(|row| apart(at(row - 1, first), at(row, first))).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use camino::Utf8Path;
+    use nalgebra::Rotation3;
+
+    use super::*;
+    use crate::measurements::pick;
+
+    /// A file of transforms, in which the rotations' entries are as many numbers side by side as a robot has joints.
+    #[test]
+    fn entries_of_a_rotation_are_no_joints() {
+        for (joints, whole) in [(6, true), (7, true), (7, false), (3, false)] {
+            let rows: String = (0..20)
+                .map(|i| {
+                    let k = f64::from(i);
+                    let m = Rotation3::from_euler_angles(0.3 * k, (0.7 * k).sin(), 0.2 - 0.1 * k);
+                    let row = |r: usize| {
+                        format!("{} {} {} {}", m[(r, 0)], m[(r, 1)], m[(r, 2)], 100.0 * (k + r as f64).sin())
+                    };
+                    format!("{} {} {}{}\n", row(0), row(1), row(2), if whole { " 0 0 0 1" } else { "" })
+                })
+                .collect();
+            let encoders: String = (0..20)
+                .map(|i| (0..joints).map(|j| format!("{} ", f64::from(i * j + 3).sin())).collect::<String>() + "\n")
+                .collect();
+            let folder = tempfile::tempdir().unwrap();
+            let path = |name: &str| Utf8Path::from_path(folder.path()).unwrap().join(name);
+            std::fs::write(path("encoders.txt"), encoders).unwrap();
+            std::fs::write(path("transforms.txt"), rows).unwrap();
+            let read = |name: &str| Part::read(&path(name), joints as usize, false).unwrap();
+            let parts = [read("encoders.txt"), read("transforms.txt")];
+            let picked = pick::by_names(&parts, joints as usize).unwrap();
+            let found = candidates(&parts, &picked, joints as usize);
+            assert!(found.iter().all(|way| way.joints.iter().all(|at| at.part == 0)), "{joints}: {found:?}");
+            let of_transforms =
+                |way: &Picked| way.points.len() == 1 && way.points[0].1.map(|at| at.column) == [3, 7, 11];
+            assert!(found.iter().any(of_transforms), "{joints}: {found:?}");
+        }
+    }
 }

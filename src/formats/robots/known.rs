@@ -22,6 +22,7 @@ struct Identified {
     scatter_rad: Option<f64>,
     smooth: Option<Smooth>,
     whole_covariance: Option<Covariance>,
+    variance_along: BTreeMap<String, f64>,
     rows: Given,
     targets: Option<Targets>,
     chosen: String,
@@ -131,5 +132,6 @@ pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     let point_mm = identified.scatter_mm.hypot(identified.smooth.as_ref().map_or(0.0, |smooth| smooth.left_mm));
     let trust = Trust { point_mm, rotation_rad: identified.scatter_rad };
     let (poses, p95_mm) = (expected.map.len(), expected.p95_mm);
-    Some(Before { parameters, covariance, correction, trust, poses, p95_mm })
+    let along = identified.variance_along;
+    Some(Before { parameters, covariance, correction, trust, along, poses, p95_mm })
 }

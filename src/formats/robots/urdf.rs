@@ -20,6 +20,9 @@ const FLANGES: [&str; 5] = ["tool0", "flange", "ee_link", "link8", "link_ee"];
 /// Words in the names of links and joints of a gripper.
 const FINGERS: [&str; 5] = ["finger", "gripper", "jaw", "knuckle", "thumb"];
 
+/// Joints of its own with which a branch is another arm: fingers have fewer.
+const OF_AN_ARM: usize = 5;
+
 /// What a joint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
@@ -200,15 +203,17 @@ impl Urdf {
         joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str()).collect()
     }
 
-    /// The end of the longest chain, where all other ends hang on it or a name tells.
+    /// The end of the longest chain, where all other ends hang on it or a name tells; none where others are arms too.
     fn flange(&self) -> Result<String> {
         let ends = self.ends();
         let longest = ends.iter().map(|e| self.moving(e).len()).max().unwrap_or(0);
         let main: Vec<&String> = ends.iter().filter(|e| self.moving(e).len() == longest).collect();
         let one_chain = main.windows(2).all(|w| self.moving(w[0]) == self.moving(w[1]));
         let named = FLANGES.iter().find_map(|name| main.iter().find(|end| end.ends_with(name)));
+        let of_main = main.first().map_or_else(Vec::new, |end| self.moving(end));
+        let own = |end: &String| self.moving(end).iter().filter(|joint| !of_main.contains(joint)).count();
         match (main.as_slice(), named) {
-            ([only], _) => Ok((*only).clone()),
+            ([only], _) if ends.iter().all(|end| own(end) < OF_AN_ARM) => Ok((*only).clone()),
             (_, Some(named)) if one_chain => Ok((*named).clone()),
             _ => {
                 let list: Vec<String> = ends.iter().map(|e| format!("{e} ({} joints)", self.moving(e).len())).collect();

@@ -54,6 +54,12 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     // Sessions have placements of their own: a sensor that was moved does no harm there.
     let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
     against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));
+    if settings.examine && against.is_empty() && robots.is_none() {
+        against.extend(robots::of_files(&uncut, &robot));
+    }
+    if settings.examine && against.is_empty() && along == Along::default() {
+        against.extend(robots::loads::find(&uncut, &robot));
+    }
     if settings.examine {
         let of_covariances;
         (set, of_covariances) = covariances::examine(&set, &robot, settings);

@@ -153,7 +153,8 @@ struct Search<'a> {
 impl<'a> Search<'a> {
     fn new(task: &Task<'a>, look: Look) -> Option<Search<'a>> {
         let robust = task.robust(Loss::Absolute).ok()?.capped(if look == Look::Capped { GROSS } else { f64::INFINITY });
-        let is_doubtful = task.rows.iter().any(|&row| robust.scores[row] > task.settings.outlier_sigmas);
+        let sigmas = task.settings.outlier_sigmas;
+        let is_doubtful = sigmas > 0.0 && task.rows.iter().any(|&row| robust.scores[row] > sigmas);
         let (rows, problem, prior) = robust.linearised();
         let parts: Vec<(&Block, &Placement, DMatrix<f64>)> = rows
             .blocks

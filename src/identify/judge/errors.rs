@@ -55,20 +55,16 @@ pub struct RowError {
     pub distance_mm: Option<f64>,
     /// Predicted minus measured point, mm, in the sensor's frame; of a touch, from the mean.
     pub point_mm: Option<Vector3<f64>>,
-    /// Variance of the measured distance, mm^2.
-    pub variance_mm2: f64,
     /// Covariance of the measured point, mm^2.
     pub covariance_mm2: Matrix3<f64>,
 }
 
 impl RowError {
-    /// The error in standard deviations of covariance and scatter, a point's as a coordinate's.
+    /// A point's error in standard deviations of covariance and scatter, as a coordinate's.
     pub fn score(&self, scatter: &Scatter) -> Option<f64> {
-        if let Some(e) = self.point_mm {
-            let total = scatter.total(&self.covariance_mm2);
-            return Some((e.dot(&total.cholesky()?.solve(&e)) / 3.0).sqrt());
-        }
-        self.distance_mm.map(|e| e.abs() / (self.variance_mm2 + scatter.point_mm.powi(2)).sqrt())
+        let e = self.point_mm?;
+        let total = scatter.total(&self.covariance_mm2);
+        Some((e.dot(&total.cholesky()?.solve(&e)) / 3.0).sqrt())
     }
 }
 
@@ -169,17 +165,11 @@ impl<'a> Judge<'a> {
         let reference = self.set.reference(group, placing).and_then(|r| self.point(robot, r, &turn));
         for &row in judged {
             let Some((predicted, measured, covariance_mm2)) = self.point(robot, row, &turn) else { continue };
-            let (mut distance_mm, mut variance_mm2) = (None, 0.0);
-            if let Some((p0, x0, c0)) = reference.as_ref().filter(|_| self.set.poses[row].on_body_mm.is_none()) {
-                let apart = measured - x0;
-                if apart.norm() > 0.0 {
-                    let u = apart.normalize();
-                    distance_mm = Some((predicted - p0).norm() - apart.norm());
-                    variance_mm2 = (u.transpose() * (covariance_mm2 + c0) * u)[0];
-                }
-            }
+            let from = reference.as_ref().filter(|_| self.set.poses[row].on_body_mm.is_none());
+            let apart = from.map(|(p0, x0, _)| ((predicted - p0).norm(), (measured - x0).norm()));
+            let distance_mm = apart.filter(|(_, read)| *read > 0.0).map(|(predicted, read)| predicted - read);
             let point_mm = placed.map(|(_, frame)| frame * predicted - measured);
-            list.push(RowError { row, distance_mm, point_mm, variance_mm2, covariance_mm2 });
+            list.push(RowError { row, distance_mm, point_mm, covariance_mm2 });
         }
     }
 
@@ -201,12 +191,11 @@ impl<'a> Judge<'a> {
         });
         let Some((from, zero_mm)) = placed else { return };
         for &row in judged {
-            if let Reading::Distance { distance_mm, sigma_mm } = self.set.poses[row].reading {
+            if let Reading::Distance { distance_mm, .. } = self.set.poses[row].reading {
                 list.push(RowError {
                     row,
                     distance_mm: Some((predicted(row) - from).norm() + zero_mm - distance_mm),
                     point_mm: None,
-                    variance_mm2: sigma_mm.map_or(0.0, |s| s * s),
                     covariance_mm2: Matrix3::zeros(),
                 });
             }
@@ -223,7 +212,6 @@ impl<'a> Judge<'a> {
                 row,
                 distance_mm: Some(off.norm()),
                 point_mm: Some(off),
-                variance_mm2,
                 covariance_mm2: Matrix3::identity() * variance_mm2,
             });
         }

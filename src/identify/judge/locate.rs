@@ -19,7 +19,7 @@ use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::task::Task;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::{product, pseudo_inverse, without};
 use crate::robot::{Parameter, Robot};
 
 /// Fewest poses of a placement.
@@ -165,8 +165,9 @@ fn open_direction(rows: &Rows, offsets: &[f64], parameters: usize) -> Option<Str
         let mut columns = DMatrix::zeros(of_all.nrows(), count);
         columns.view_mut((0, 0), of_all.shape()).copy_from(of_all);
         // Turns in mrad about the middle of the points, as the other angles are.
-        columns.view_mut((0, shared + 6 * k), (of_all.nrows(), 6)).copy_from(&placement.linear.design);
-        columns.columns_mut(shared + 6 * k, 3).scale_mut(1e-3);
+        let [turns, shifts] = [0, 3].map(|first| placement.linear.design.columns(first, 3).into_owned());
+        columns.columns_mut(shared + 6 * k, 3).copy_from(&(without(&turns, &shifts) * 1e-3));
+        columns.columns_mut(shared + 6 * k + 3, 3).copy_from(&shifts);
         normal += product(&columns, &columns);
     }
     let eigen = normal.symmetric_eigen();

@@ -1,5 +1,7 @@
 //! How far to trust the result: covariance of the parameters, the position error to expect, and what poses would tell.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -8,7 +10,7 @@ use crate::identify::data::dataset::Dataset;
 use crate::identify::model::kinematics::Kinematics;
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
-use crate::identify::solve::linearised::Linearised;
+use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
 
 /// Covariance of the identified parameters, in the units of the file.
@@ -163,6 +165,23 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     if !matches!(formulation.model, Model::Position | Model::Pose) {
         return times;
     }
+    for (_, of_rows) in each_row(formulation) {
+        for (row, _, predicted) in of_rows {
+            let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
+            let without = shares.map(|share| share / (1.0 - share)).sum();
+            if shares.sum() > 0.0 {
+                times[row] = without / shares.sum();
+            }
+        }
+    }
+    times
+}
+
+/// Of each row of a placement: its row of the data set, where its white residuals stand, and the variance that the fit predicts them to.
+type Predicted = Vec<(usize, Range<usize>, DMatrix<f64>)>;
+
+/// The placements of a fit with the sensor's own errors as found, and what it predicts of each row.
+pub(super) fn each_row(formulation: &Formulation) -> Vec<(Placement, Predicted)> {
     let offsets = formulation.offsets_of();
     let count = formulation.parameters().len();
     let rows = formulation.rows.with_sensor_fixed(&offsets);
@@ -171,21 +190,19 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     let sds = DMatrix::from_diagonal(&DVector::from_vec(sds));
     let before = DMatrix::identity(count, count) * if formulation.held { 1.0 } else { 0.0 };
     let covariance = &sds * pseudo_inverse(before + &sds * product(&jacobian, &jacobian) * &sds) * &sds;
-    for placement in Linearised::new(&rows, &offsets[..count]).placements {
+    let of_placement = |placement: Placement| {
         let Eliminated { follow, inverse, .. } = placement.eliminated();
         let columns = &placement.linear.jacobian - &placement.linear.design * follow;
-        for (place, at) in placement.by_pose() {
+        let of_pose = |(place, at): (usize, Range<usize>)| {
             let of_row = |all: &DMatrix<f64>| all.rows(at.start, at.len()).into_owned();
             let (columns, own) = (of_row(&columns), of_row(&placement.linear.design));
             let predicted = &columns * &covariance * columns.transpose() + &own * &inverse * own.transpose();
-            let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
-            let without = shares.map(|share| share / (1.0 - share)).sum();
-            if shares.sum() > 0.0 {
-                times[rows.rows[place]] = without / shares.sum();
-            }
-        }
-    }
-    times
+            (rows.rows[place], at, predicted)
+        };
+        let predicted = placement.by_pose().map(of_pose).collect();
+        (placement, predicted)
+    };
+    Linearised::new(&rows, &offsets[..count]).placements.into_iter().map(of_placement).collect()
 }
 
 /// From where to where each joint was read, deg (mm where it slides).

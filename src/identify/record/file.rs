@@ -1,5 +1,7 @@
 //! `identification.json`: what stands in it.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::parameters::{Identifiability, MethodRecord};
@@ -58,6 +60,8 @@ pub struct Record {
     pub covariance: Option<Covariance>,
     /// The same with what the poses tell next to nothing of as uncertain as before them: for poses elsewhere.
     pub whole_covariance: Option<Covariance>,
+    /// Times that the variance of residuals along what may change on a robot is larger than alike in all directions, by its word of `verify --against`.
+    pub variance_along: BTreeMap<String, f64>,
     /// The position error to expect of the chosen robot; `None` where nominal was kept.
     pub expected: Option<Expected>,
     /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.

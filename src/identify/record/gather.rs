@@ -9,6 +9,7 @@ use super::quality::quality;
 use super::touched::Touched;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::sessions::Along;
+use crate::identify::judge::recheck::variances_along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
 use crate::identify::run::{Identification, certainty};
 use crate::identify::sensor::Extra;
@@ -71,6 +72,7 @@ impl Record {
             doctor: findings.all(),
             covariance: formulation.map(|f| Covariance::new(f, &f.robot_covariance())),
             whole_covariance: formulation.map(|f| Covariance::new(f, &f.whole_covariance())),
+            variance_along: formulation.map_or_else(Vec::new, variances_along).into_iter().collect(),
             expected: formulation.map(|f| Expected::new(f, set, &found.fitted)),
             scale: found.scale(set),
             targets: set.targets.clone().map(|targets| targets.solved(&found.extras)),

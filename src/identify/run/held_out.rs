@@ -80,7 +80,7 @@ impl Identification {
         });
         let points = chosen.iter().any(|e| e.point_mm.is_some());
         let size = |e: &RowError| match points {
-            true => e.point_mm.and_then(|_| e.score(&self.scatter)),
+            true => e.score(&self.scatter),
             false => e.distance_mm.map(f64::abs),
         };
         let more: Vec<f64> = chosen.iter().zip(&before).filter_map(|(c, b)| Some(size(c)? - size(b)?)).collect();

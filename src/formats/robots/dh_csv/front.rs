@@ -75,17 +75,32 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         let grid = Grid { rows: matrix.rows.clone(), ..empty(path) };
         let names = given.clone().or(matrix.names.map(|names| names.map(str::to_owned).to_vec()));
         let names = names.as_deref();
-        return ways(&Table {
+        let mut ways = ways(&Table {
             names,
             known: &read.known,
             ..table(&grid, &matrix.rows, asked, read.words, given.as_deref())
-        });
+        })?;
+        ways.iter_mut().for_each(|way| way.said += &beside_others(&matrix));
+        return Ok(ways);
     }
     if let Some((line, _)) = read.links.as_ref().and_then(|links| links.rows.first()) {
         let message = "the parameters have names of their own here, and no table has columns to name".to_owned();
         return Err(empty(path).refuse(*line, message, Some("leave out `--columns`")));
     }
     of_grid(&Grid::of_text(path, alone(path, &text)?.into_owned())?, asked, Some(read.words))
+}
+
+/// Which table of several was taken.
+fn beside_others(matrix: &dh_text::Matrix) -> String {
+    let others: Vec<String> = matrix.others.iter().map(u64::to_string).collect();
+    match &others[..] {
+        [] => String::new(),
+        _ => format!(
+            ", the longest table, from line {}, of several: others begin at line {}; where one of them is the robot's, leave that one alone in the file",
+            matrix.rows[0].0,
+            others.join(", ")
+        ),
+    }
 }
 
 fn empty(path: &Utf8Path) -> Grid {

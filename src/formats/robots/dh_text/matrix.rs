@@ -17,7 +17,12 @@ const ABOVE: usize = 8;
 pub struct Matrix {
     pub rows: Vec<(u64, Fields)>,
     pub names: Option<[&'static str; 4]>,
+    /// Where further tables of several rows begin, lines.
+    pub others: Vec<u64>,
 }
+
+/// Rows from which on another table may be of another robot.
+const OF_A_ROBOT: usize = 3;
 
 /// What a line is to a table.
 #[derive(Debug, PartialEq)]
@@ -80,7 +85,9 @@ pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>,
         _ => None,
     };
     let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
-    Ok(Some(Matrix { rows: run.clone().filter_map(cells).collect(), names: named }))
+    let others = tables().filter(|other| *other != run && rows(other) >= OF_A_ROBOT);
+    let others = others.map(|other| other.start as u64 + 1).collect();
+    Ok(Some(Matrix { others, rows: run.clone().filter_map(cells).collect(), names: named }))
 }
 
 /// The lines of each table: an empty line ends one that is not inside of brackets.

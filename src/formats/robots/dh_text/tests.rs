@@ -132,3 +132,18 @@ fn lists_have_sizes_factors_and_names_of_a_family() {
         assert_eq!(read(&text, false).unwrap().links, None, "{text}");
     }
 }
+
+#[test]
+fn tables_beside_the_longest_are_named_by_their_lines() {
+    let arm = |name: &str, joints: usize| {
+        let rows: String = (0..joints).map(|i| format!("  [0, {}, 0, {}],\n", 100 * i, 10 + i)).collect();
+        format!("def {name}():\n return np.array([\n{rows} ])\n\n")
+    };
+    for (joints, others) in
+        [(vec![7, 6], vec![14]), (vec![6, 7, 4], vec![3, 24]), (vec![2, 7], vec![]), (vec![7], vec![])]
+    {
+        let text: String = joints.iter().enumerate().map(|(k, n)| arm(&format!("arm_{k}"), *n)).collect();
+        let matrix = table(&text).unwrap().unwrap();
+        assert_eq!((matrix.rows.len(), &matrix.others), (7, &others), "{text}");
+    }
+}

@@ -37,8 +37,8 @@ pub(super) const PLACEMENT: usize = 6;
 pub(super) const TARGET: usize = 3;
 
 /// The typical size of an error.
-fn typical_mm(errors_mm: &[f64]) -> f64 {
-    median(errors_mm.iter().copied()).unwrap_or(0.0).max(LEAST_MM)
+fn typical_mm(errors_mm: &[Vector3<f64>]) -> f64 {
+    median(errors_mm.iter().map(Vector3::norm)).unwrap_or(0.0).max(LEAST_MM)
 }
 
 /// Points with the joints that they were measured at.
@@ -52,7 +52,12 @@ pub(super) struct Points {
     pub(super) groups: Vec<usize>,
     /// Of each row, which of several tools it is of, from 0; empty where all are of one.
     pub(super) tools: Vec<usize>,
+    /// Of each row, whether it is under the load whose weight on the joints is among the parameters; empty where there is none.
+    pub(super) loaded: Vec<bool>,
 }
+
+/// Changes the weights of all rows by their errors, mm.
+type Weigh<'a> = dyn FnMut(&[Vector3<f64>], &mut [f64]) + 'a;
 
 /// What a fit leaves.
 #[derive(Debug, Clone)]
@@ -61,8 +66,8 @@ pub(super) struct Left {
     pub(super) squares: f64,
     numbers: f64,
     pub(super) taken: f64,
-    /// Size of each row's error, mm, in the order of the parts' rows.
-    errors_mm: Vec<f64>,
+    /// Each row's error, base frame, mm, in the order of the parts' rows.
+    pub(super) errors_mm: Vec<Vector3<f64>>,
 }
 
 impl Left {
@@ -79,7 +84,10 @@ impl Left {
     /// Takes the weight of those of its rows that are gross errors.
     pub(super) fn leave_out_gross(&self, rows: &[usize], weights: &mut [f64]) {
         let limit = GROSS * typical_mm(&self.errors_mm);
-        rows.iter().zip(&self.errors_mm).filter(|(_, error)| **error > limit).for_each(|(&row, _)| weights[row] = 0.0);
+        rows.iter()
+            .zip(&self.errors_mm)
+            .filter(|(_, error)| error.norm() > limit)
+            .for_each(|(&row, _)| weights[row] = 0.0);
     }
 
     pub(super) fn and(mut self, other: Left) -> Left {
@@ -118,7 +126,7 @@ impl Points {
         self.fitted(&parts, start, steps, vec![1.0; self.points_mm.len()], &mut |errors, weights| {
             let typical = typical_mm(errors);
             for (&row, error) in rows.iter().zip(errors) {
-                weights[row] = (WHOLE * typical / error.max(LEAST_MM)).min(1.0);
+                weights[row] = (WHOLE * typical / error.norm().max(LEAST_MM)).min(1.0);
             }
         })
     }
@@ -144,7 +152,7 @@ impl Points {
         mut x: DVector<f64>,
         steps: usize,
         mut weights: Vec<f64>,
-        weigh: &mut dyn FnMut(&[f64], &mut [f64]),
+        weigh: &mut Weigh,
     ) -> (Left, DVector<f64>) {
         let kinematics: Vec<Kinematics> = parts.iter().map(|part| self.kinematics(part)).collect();
         let (mut left, mut step) = self.at(parts, &kinematics, &x, &weights, FIRST_MM);
@@ -204,6 +212,37 @@ impl Points {
         (normal, left)
     }
 
+    /// One robot for these rows with common placements, where each row's target is taken by the load if it is under it, and how far that is, mm.
+    pub(super) fn under_load(&self, rows: &[usize], weights: &[f64]) -> (Left, Vec<Vector3<f64>>) {
+        let parts = [rows.to_vec()];
+        let (left, x) = self.fitted(&parts, self.at_file(&parts), STEPS, weights.to_vec(), &mut |_, _| ());
+        let of_load: Vec<usize> = self.of_load().collect();
+        let offsets = &x.as_slice()[..self.parameters.len()];
+        let moved = |place: &Place| of_load.iter().map(|&i| place.point_columns.column(i) * offsets[i]).sum();
+        (left, self.kinematics(rows).places(offsets, true).iter().map(moved).collect())
+    }
+
+    /// Where the load's weights stand among the parameters.
+    fn of_load(&self) -> impl Iterator<Item = usize> + '_ {
+        let is_of_load = |(_, parameter): &(usize, &Parameter)| matches!(parameter, Parameter::Gravity(..));
+        self.parameters.iter().enumerate().filter(is_of_load).map(|(i, _)| i)
+    }
+
+    /// Where the rows' targets are: those that are not under the load know nothing of it.
+    fn places(&self, part: &[usize], kinematics: &Kinematics, offsets: &[f64]) -> Vec<Place> {
+        let mut places = kinematics.places(offsets, true);
+        if !self.loaded.is_empty() {
+            let mut without = offsets.to_vec();
+            self.of_load().for_each(|i| without[i] = 0.0);
+            let free = kinematics.places(&without, true);
+            for (k, mut place) in free.into_iter().enumerate().filter(|(k, _)| !self.loaded[part[*k]]) {
+                self.of_load().for_each(|i| place.point_columns.column_mut(i).fill(0.0));
+                places[k] = place;
+            }
+        }
+        places
+    }
+
     fn kinematics(&self, part: &[usize]) -> Kinematics {
         let joints: Vec<&[f64]> = part.iter().map(|&row| self.joints_rad[row].as_slice()).collect();
         Kinematics::new(&self.robot, &self.robot, &self.parameters, &joints)
@@ -231,19 +270,20 @@ impl Points {
     }
 
     /// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual; how many numbers were measured
-    /// beyond those of the placements, and the size of each row's error, mm.
+    /// beyond those of the placements, and each row's error, mm.
     fn normal(
         &self,
         part: &[usize],
         kinematics: &Kinematics,
         offsets: &[f64],
         weights: &[f64],
-    ) -> (DMatrix<f64>, f64, Vec<f64>) {
-        let places = kinematics.places(&offsets[..self.parameters.len()], true);
+    ) -> (DMatrix<f64>, f64, Vec<Vector3<f64>>) {
+        let places = self.places(part, kinematics, &offsets[..self.parameters.len()]);
         let kept = offsets.len() + 1;
         let moved: Vec<Point3<f64>> =
             part.iter().zip(&places).map(|(&row, place)| place.point_mm + self.of_tool(row, place, offsets)).collect();
-        let (mut normal, mut numbers, mut errors_mm) = (DMatrix::zeros(kept, kept), 0.0, vec![0.0; part.len()]);
+        let (mut normal, mut numbers, mut errors_mm) =
+            (DMatrix::zeros(kept, kept), 0.0, vec![Vector3::zeros(); part.len()]);
         for group in part.iter().map(|&row| self.groups[row]).collect::<BTreeSet<usize>>() {
             let of_group: Vec<usize> = (0..part.len()).filter(|&i| self.groups[part[i]] == group).collect();
             let pair = |&i: &usize| (self.points_mm[part[i]], moved[i], weights[part[i]]);
@@ -257,7 +297,7 @@ impl Points {
             for (k, &i) in of_group.iter().enumerate() {
                 let root = weights[part[i]].sqrt();
                 let error: Vector3<f64> = frame * self.points_mm[part[i]] - moved[i];
-                errors_mm[i] = error.norm();
+                errors_mm[i] = error;
                 let mut rows = columns.rows_mut(TARGET * k, TARGET);
                 rows.columns_mut(0, self.parameters.len()).copy_from(&(root * &places[i].point_columns));
                 if let Some(at) = self.further_tool(part[i]) {

@@ -11,6 +11,7 @@
 //! parts, which looks like another robot.
 
 mod fit;
+pub(super) mod loads;
 pub(super) mod tools;
 
 use rayon::prelude::*;
@@ -78,12 +79,11 @@ pub struct Part {
 impl Robots {
     /// What was found.
     pub fn finding(&self) -> Finding {
-        let alone: Vec<String> = self.parts.iter().map(|p| format!("{} {:.3} mm", p.name, p.alone_mm)).collect();
         Finding::new(
             format!(
                 "the rows are not of one robot, or not of one state of it: a robot of its own leaves in {} a coordinate, one robot for all of \
                  them {:.3} mm, although each part had a tool and a placement of its own",
-                alone.join(", in "),
+                alone(&self.parts),
                 self.together_mm
             ),
             "identify each part by itself; where it was one robot, look for what was done to it between them",
@@ -114,7 +114,7 @@ impl Robots {
 pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots> {
     let table = Table::new(set, robot)?;
     let files = table.files(set);
-    let of_files = (files.len() > 1).then(|| table.judged(files, 1)).flatten();
+    let of_files = (files.len() > 1).then(|| table.judged(files, 1, Table::compared)).flatten();
     let (parts, compared) = of_files.or_else(|| table.stretches())?;
     // A sensor that was moved several times is no robot.
     let (cut, along) = sessions::find(set, robot, settings);
@@ -126,12 +126,31 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots>
             return None;
         }
     }
-    let part = |(rows, left): (&Vec<usize>, &Left)| {
-        let rows: Vec<usize> = rows.iter().map(|&i| table.rows[i]).collect();
-        Part { name: named(set, &rows), alone_mm: left.scatter_mm(), rows }
-    };
-    let each = parts.iter().zip(&compared.each).map(part).collect();
-    Some(Robots { parts: each, together_mm: compared.together.scatter_mm() })
+    Some(Robots { parts: table.parts(set, &parts, &compared), together_mm: compared.together.scatter_mm() })
+}
+
+/// What is said of files of which each has far less error by itself than with the others, though no tool and no placement tells them apart.
+pub(super) fn of_files(set: &Dataset, robot: &Robot) -> Option<Finding> {
+    let mut table = Table::new(set, robot)?;
+    let files = Some(table.files(set)).filter(|files| files.len() > 1)?;
+    // What the links lack of a load, every robot has of its own.
+    table.points = table.points.with_load(Vec::new());
+    let (parts, compared) = table.judged(files, 1, Table::compared_as_one)?;
+    let parts = table.parts(set, &parts, &compared);
+    Some(Finding::new(
+        format!(
+            "the files are not of one state of the robot, as where it carried other loads: a robot of its own leaves in {} a coordinate, one robot \
+             for all of them {:.3} mm",
+            alone(&parts),
+            compared.together.scatter_mm()
+        ),
+        "identify each file by itself, or measure all of them with the load that the robot works with",
+    ))
+}
+
+/// What robots of their own leave.
+fn alone(parts: &[Part]) -> String {
+    parts.iter().map(|p| format!("{} {:.3} mm", p.name, p.alone_mm)).collect::<Vec<_>>().join(", in ")
 }
 
 /// Times the median that rows which are errors of their own are off at the least, and rounds in which the target's place is found: errors of a
@@ -171,6 +190,9 @@ fn named(set: &Dataset, rows: &[usize]) -> String {
     }
 }
 
+/// How parts are compared.
+type Comparing = fn(&Table, &[Vec<usize>]) -> Option<Compared>;
+
 /// Parts by their rows of the table, with what robots leave in them.
 type Judged = (Vec<Vec<usize>>, Compared);
 
@@ -205,6 +227,7 @@ impl Table {
             points_mm: rows.iter().map(point).collect::<Option<Vec<_>>>()?,
             groups: rows.iter().map(|&row| set.poses[row].group).collect(),
             tools: Vec::new(),
+            loaded: Vec::new(),
         };
         Some(Table { rows, points })
     }
@@ -228,7 +251,7 @@ impl Table {
             let late = parts[p].split_off(at);
             parts.insert(p + 1, late);
             tried += self.rows.len();
-            if let Some(judged) = self.judged(parts.clone(), tried) {
+            if let Some(judged) = self.judged(parts.clone(), tried, Table::compared) {
                 return Some(judged);
             }
         }
@@ -256,9 +279,9 @@ impl Table {
         Some((at, count as f64 * (whole.scatter_mm() / apart_mm).ln()))
     }
 
-    /// These parts where they are of different robots; `tried` is the number of such cuts that were looked at.
-    fn judged(&self, parts: Vec<Vec<usize>>, tried: usize) -> Option<Judged> {
-        let compared = self.compared(&parts)?;
+    /// These parts where they are of different robots, as `compare` has it; `tried` is the number of such cuts that were looked at.
+    fn judged(&self, parts: Vec<Vec<usize>>, tried: usize, compare: Comparing) -> Option<Judged> {
+        let compared = compare(self, &parts)?;
         let Compared { apart, together, .. } = &compared;
         if together.scatter_mm() < (MUCH_LARGER * apart.scatter_mm()).max(REPEATABILITY_MM)
             || by_chance(apart, together)? * tried as f64 > CHANCE
@@ -270,7 +293,7 @@ impl Table {
         let (same, others): (Vec<_>, Vec<_>) = rivals.into_iter().partition(|rival| are_alike(&parts, rival));
         let is_untold = !same.is_empty() && compared.share() * UNTOLD > 1.0;
         let beaten =
-            |rival: &Vec<Vec<usize>>| self.compared(rival).is_none_or(|rival| rival.share() > BEATS * compared.share());
+            |rival: &Vec<Vec<usize>>| compare(self, rival).is_none_or(|rival| rival.share() > BEATS * compared.share());
         (!is_untold && others.iter().all(beaten)).then_some((parts, compared))
     }
 
@@ -281,6 +304,22 @@ impl Table {
         let each: Vec<Left> = parts.iter().map(alone).collect();
         let apart = each.iter().cloned().reduce(Left::and)?;
         Some(Compared { each, apart, together: self.points.together(parts, &weights) })
+    }
+
+    /// The same with what one robot leaves that has one tool for all parts, and the placements of their groups.
+    fn compared_as_one(&self, parts: &[Vec<usize>]) -> Option<Compared> {
+        let compared = self.compared(parts)?;
+        let together = self.points.together(&[parts.concat()], &self.points.without_gross(parts));
+        Some(Compared { together, ..compared })
+    }
+
+    /// These parts with their names.
+    fn parts(&self, set: &Dataset, parts: &[Vec<usize>], compared: &Compared) -> Vec<Part> {
+        let part = |(rows, left): (&Vec<usize>, &Left)| {
+            let rows: Vec<usize> = rows.iter().map(|&i| self.rows[i]).collect();
+            Part { name: named(set, &rows), alone_mm: left.scatter_mm(), rows }
+        };
+        parts.iter().zip(&compared.each).map(part).collect()
     }
 
     /// The same rows cut along a joint into parts of the same sizes.

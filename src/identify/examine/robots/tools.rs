@@ -138,7 +138,7 @@ impl Table {
         parts
     }
 
-    /// The sensor, the tool and, between two sessions, the zero of the joint that explains most. A first joint that stands elsewhere is a sensor that
+    /// The sensor, the tool and, between two sessions, the zero of the joint that explains most, and a load. A first joint that stands elsewhere is a sensor that
     /// turned.
     fn causes(&self, parts: &[Vec<usize>]) -> Option<Vec<Cause>> {
         let tools = self.with_tools(parts)?;
@@ -161,7 +161,14 @@ impl Table {
             let by = if slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) };
             cause(format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0)
         });
-        Some([Cause { is_sensor: true, ..sensor }, tool].into_iter().chain(zero).collect())
+        let load = (parts.len() == 2).then(|| {
+            let loaded = (0..self.rows.len()).map(|row| parts[1].contains(&row)).collect();
+            let (left, moved_mm) = self.points.with_load(loaded).under_load(&parts.concat(), &tools.weights);
+            let by = moved_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
+            let free = left.taken - tools.together.taken;
+            cause(format!("a load was put on or taken off, which moves the target by up to {by:.2} mm"), &left, free)
+        });
+        Some([Cause { is_sensor: true, ..sensor }, tool].into_iter().chain(zero).chain(load).collect())
     }
 
     /// What one robot leaves where a joint stands elsewhere in the second part, by as much as leaves least: squares of errors are a parabola of that.

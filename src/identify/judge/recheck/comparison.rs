@@ -56,7 +56,10 @@ impl Comparison<'_> {
     }
 
     fn of(&self, compared: &Compared, used: &[usize]) -> Option<Said> {
-        let suspects = suspects(self.robot, &self.parameters);
+        let mut suspects = suspects(self.robot, &self.parameters);
+        for suspect in &mut suspects {
+            suspect.variance = self.before.along.get(&suspect.word).map_or(1.0, |times| times.max(1.0));
+        }
         let (linear, look) = compared.at(&vec![0.0; compared.count])?;
         let moves = Moves::new(&linear, compared.count);
         let looks = Looks { look, again: &|offsets| compared.at(offsets).map(|(_, look)| look), suspects: &suspects };

@@ -1,5 +1,7 @@
 //! What is compared with, and what is said of a robot.
 
+use std::collections::BTreeMap;
+
 use nalgebra::DMatrix;
 use serde::Serialize;
 
@@ -19,6 +21,8 @@ pub struct Before {
     pub correction: Vec<f64>,
     /// How it scattered.
     pub trust: Trust,
+    /// Times that variance along each cause, by its word; one where nothing is said.
+    pub along: BTreeMap<String, f64>,
     /// Poses that this was found from.
     pub poses: usize,
     /// What 95 % of its position errors were stated to be below, mm.

@@ -45,7 +45,7 @@ impl<'a> Looks<'a> {
         let is_large = suspect.columns.iter().all(|&(at, _)| self.look.columns.column(at).norm() > UNSEEN);
         let seen_rad = |direction: &DVector<f64>| {
             let along = self.look.difference.along(direction);
-            along.map_or(f64::INFINITY, |(_, sigma)| self.seen(sigma).to_radians())
+            along.map_or(f64::INFINITY, |(_, sigma)| self.seen(sigma * suspect.variance.sqrt()).to_radians())
         };
         let turns = suspect.unit == Unit::Deg.flag();
         is_large && (!turns || self.look.directions(suspect).iter().all(|direction| seen_rad(direction) < LINEAR_RAD))
@@ -59,6 +59,7 @@ impl<'a> Looks<'a> {
     pub(super) fn of(&self, suspect: &Suspect, moves: &Moves) -> CauseSeen {
         let difference = &self.look.difference;
         let along = self.look.directions(suspect).first().and_then(|d| difference.along(d));
+        let along = along.map(|(amount, sigma)| (amount, sigma * suspect.variance.sqrt()));
         let amount = along.filter(|_| self.is_seen(suspect));
         let unit_mm = moves.most_mm(&suspect.columns, &[1.0]);
         let seen = amount.map(|(_, sigma)| self.seen(sigma));
@@ -79,7 +80,8 @@ impl<'a> Looks<'a> {
         let over = |suspect: &Suspect| {
             let directions = self.look.directions(suspect);
             let gained = difference.left_by(&directions).map(|left| difference.chi_square() - left);
-            self.is_seen(suspect) && gained.is_some_and(|g| g > difference.limit(directions.len(), chance))
+            self.is_seen(suspect)
+                && gained.is_some_and(|g| g > suspect.variance * difference.limit(directions.len(), chance))
         };
         difference.chi_square() > difference.limit(difference.off.len(), chance) || self.suspects.iter().any(over)
     }

@@ -7,6 +7,7 @@
 //! ([`crate::difference`]), all looks together at one level. Where the robot did not change, each placement is compared with the old one.
 //! Rows that fit far worse than the rest are named and left out. Goes wrong: what a placement takes up (the first joint's zero) is only seen as a sensor that moved; two joints at once are a cause unknown.
 
+mod along;
 mod compared;
 mod comparison;
 mod found;
@@ -17,6 +18,7 @@ mod suspects;
 #[cfg(test)]
 mod tests;
 
+pub use along::variances_along;
 pub use comparison::Stood;
 pub use found::{Before, CauseSeen, Moved, Recheck};
 

@@ -9,10 +9,12 @@ pub(super) struct Suspect {
     pub(super) unit: &'static str,
     /// Index of the column, and what one unit of the file is in it.
     pub(super) columns: Vec<(usize, f64)>,
+    /// Times that the variance of readings along it is larger than alike in all directions.
+    pub(super) variance: f64,
 }
 
 fn suspect(word: &str, words: &str, unit: &'static str, columns: Vec<(usize, f64)>) -> Suspect {
-    Suspect { word: word.to_owned(), words: words.to_owned(), unit, columns }
+    Suspect { word: word.to_owned(), words: words.to_owned(), unit, columns, variance: 1.0 }
 }
 
 /// The zero of a joint.

@@ -41,6 +41,7 @@ fn cell(oriented: bool, seed: u64) -> Cell {
         parameters: formulation.parameters().to_vec(),
         covariance: formulation.whole_covariance(),
         trust: Trust { point_mm: scatter.point_mm, rotation_rad: oriented.then_some(scatter.rotation_rad) },
+        along: variances_along(formulation).into_iter().collect(),
         poses: set.poses.len(),
         p95_mm: 0.1,
     };
