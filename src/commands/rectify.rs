@@ -319,7 +319,7 @@ mod tests {
         assert_eq!(lost_by(0.0, Vector3::new(60.0, 0.0, 0.0)), None);
         assert_eq!(lost_by(-0.2, Vector3::new(100.0, 0.0, 10.0)), None);
         // Far round the board, and far in front of the other.
-        let said = lost_by(0.83, Vector3::new(-520.0, 0.0, 290.0)).unwrap();
+        let said = lost_by(0.83, Vector3::new(-520.0, 0.0, 450.0)).unwrap();
         assert!(said.contains("1000 mm away"), "{said}");
     }
 }
