@@ -84,9 +84,8 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
     let status = if lost.is_some() { Status::OutOfTolerance } else { rows(&file) };
-    doubts.extend(lost);
     let json = out.write_json("rectified.json", &file)?;
-    doubts.extend(report::rectify::doubt(&file));
+    doubts.extend(lost.into_iter().chain(report::rectify::doubt(&file)));
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };

@@ -104,25 +104,27 @@ pub fn approach_place(
     flange_from_tool: &Transform,
     start_rad: &[f64],
 ) -> Approach {
-    let weight = TURN_MM / ARM_MM;
-    let missed = |q: &[f64]| {
+    let missed = |q: &[f64], turn_mm: f64| {
         let reached = robot.base_from_flange(q) * flange_from_tool;
         let t = reached.translation.vector - base_from_tool.translation.vector;
-        let r = rotation_vector(&(reached * base_from_tool.inverse())) * TURN_MM;
+        let r = rotation_vector(&(reached * base_from_tool.inverse())) * turn_mm;
         Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
     };
-    let columns = |q: &[f64]| {
+    let columns = |q: &[f64], turn_mm: f64| {
         let mut columns = jacobian(robot, q);
         let out = robot.base_from_flange(q).rotation * flange_from_tool.translation.vector;
         for mut column in columns.column_iter_mut() {
             let axis = nalgebra::Vector3::new(column[3], column[4], column[5]) / ARM_MM;
             let moved = axis.cross(&out);
             (0..3).for_each(|i| column[i] += moved[i]);
-            (3..6).for_each(|i| column[i] *= weight);
+            (3..6).for_each(|i| column[i] *= turn_mm / ARM_MM);
         }
         columns
     };
-    let (joints_rad, residual) = descend(robot, start_rad, &missed, &columns);
+    let toward =
+        |start_rad: &[f64], turn_mm: f64| descend(robot, start_rad, &|q| missed(q, turn_mm), &|q| columns(q, turn_mm));
+    // A turn that is missing by far still moves the place a little: the last word is the place's.
+    let (joints_rad, residual) = toward(&toward(start_rad, TURN_MM).0, 0.0);
     Approach { joints_rad, miss_mm: residual.fixed_rows::<3>(0).norm() }
 }
 

@@ -157,8 +157,12 @@ fn found(small: &Grey8, (level, way): Attempt, board: Board, search: &mut Search
         let grid = Lattice { columns, rows, cells: corners.into_iter().map(Some).collect() };
         return Some(grid.clone()).filter(|_| extent::without_outline(small, grid).count() == board.corner_count());
     }
-    let darkened = (way == Way::Darkened).then(|| small.darkest_around());
-    let small = darkened.as_ref().unwrap_or(small);
+    if way == Way::Darkened {
+        // Borders of what is hidden look otherwise there, and say nothing of which part of a board is seen.
+        let darkened = small.darkest_around();
+        let whole = |grid: &Places| grid.count() == board.corner_count();
+        return fitting(&darkened, &grown(&darkened, board.corner_count())?, board).filter(whole);
+    }
     let grid = grown(small, board.corner_count())?;
     let fitting = fitting(small, &grid, board);
     if fitting.is_none() && search.seen.as_ref().is_none_or(|(seen, _)| tells(&grid) > tells(seen)) {

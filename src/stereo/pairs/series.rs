@@ -18,6 +18,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
+use crate::stereo::pairs::missed::Missed;
 use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
 use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
@@ -34,35 +35,6 @@ const FIRST_LENS: Lens = Lens::Brown5;
 /// A rig that misses half of its pairs by more than this share of the picture's width, and by several times what each camera leaves of its
 /// own pictures, is the rig of none of them.
 const LARGEST_SHARE: f64 = 2e-3;
-
-/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment: a lens or a rig
-/// that lacks something leaves no more than about this.
-pub const TIMES: f64 = 3.0;
-
-/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in the rig is twice that in
-/// one camera.
-const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
-
-/// How far pictures are usually missed, px.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Missed {
-    /// By each camera alone, the median over its own pictures.
-    pub alone_px: f64,
-    /// By the rig of all pairs, the median over them.
-    pub paired_px: f64,
-}
-
-impl Missed {
-    /// Whether the two pictures of the pairs were usually not taken at one moment.
-    pub fn is_of_two_moments(&self) -> bool {
-        self.paired_px > TIMES * self.alone_px
-    }
-
-    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
-    pub fn is_better_alone(&self) -> bool {
-        self.paired_px > HALF_IS_LOST * self.alone_px
-    }
-}
 
 /// The pairs of a rig, near their common minimum.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,7 +11,7 @@
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
-use crate::stereo::pairs::series::Missed;
+use crate::stereo::pairs::missed::Missed;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;

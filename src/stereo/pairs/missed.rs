@@ -1,0 +1,30 @@
+//! How far pictures are missed by one camera and by the rig of all pairs, and what a large difference of the two means.
+
+/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment: a lens or a rig
+/// that lacks something leaves no more than about this.
+pub const TIMES: f64 = 3.0;
+
+/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in the rig is twice that in
+/// one camera.
+const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
+
+/// How far pictures are usually missed, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// By each camera alone, the median over its own pictures.
+    pub alone_px: f64,
+    /// By the rig of all pairs, the median over them.
+    pub paired_px: f64,
+}
+
+impl Missed {
+    /// Whether the two pictures of the pairs were usually not taken at one moment.
+    pub fn is_of_two_moments(&self) -> bool {
+        self.paired_px > TIMES * self.alone_px
+    }
+
+    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
+    pub fn is_better_alone(&self) -> bool {
+        self.paired_px > HALF_IS_LOST * self.alone_px
+    }
+}
