@@ -121,7 +121,7 @@ pub(super) fn along_sight(case: &Case) -> Option<Evidence> {
         Some(expansion.calibration * sigma_mm),
         case,
         format!(
-            "expanded uncertainty, by the calibration alone, of a length of {:.0} mm along the line of sight, where it is largest in the volume: a focal \
+            "expanded uncertainty, by the calibration alone, of a length of {:.0} mm that lies along the line of sight, where it is largest in the volume: a focal \
              length that is hardly known stretches all depths",
             volume.length_mm
         ),
