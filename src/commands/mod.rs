@@ -1,5 +1,6 @@
 //! One file or folder a command; each reads as the list of its stages, and nothing else knows their order.
 
+mod beyond;
 pub mod board;
 pub mod camera_check;
 pub mod compensate;

@@ -52,7 +52,7 @@ struct State {
     swept: BTreeSet<Utf8PathBuf>,
 }
 
-/// The same of a folder that is not opened yet.
+/// The path of an earlier command's result: in this folder where it is there, else in the one where results usually are.
 pub fn or_usual(folder: &Utf8Path, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
     let (here, usual) = (folder.join(name), usual.join(name));
     if here.is_file() || !usual.is_file() { here } else { usual }
@@ -121,7 +121,7 @@ impl OutDir {
         self.path.join(name)
     }
 
-    /// The path of an earlier command's result: in this folder where it is there, else in the one where results usually are.
+    /// See [`or_usual`].
     pub fn or_usual(&self, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
         or_usual(&self.path, name, usual)
     }

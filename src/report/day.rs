@@ -37,9 +37,7 @@ impl Day {
     fn advice(&self) -> &str {
         self.robot.as_ref().map_or("", |robot| text(robot, "/advice"))
     }
-}
 
-impl Day {
     /// The robot's advice beside the rig's verdict, where there is a robot.
     fn advised(&self) -> &'static str {
         match self.advice() {

@@ -43,7 +43,7 @@ pub struct Calibration {
     pub neighbours: NeighbourCorrelation,
     /// Factor on the covariance that follows from the weighted normal equations: what neighbours share, and the loss.
     pub inflation: f64,
-    /// What is expected of cameras and board before any picture.
+    /// What is expected of cameras and board beside the pairs: before any picture, or of lenses that are known or that each camera alone told.
     pub priors: Priors,
     /// What each camera leaves of its own pictures, the median over them, px.
     pub alone_px: f64,

@@ -62,7 +62,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     }
     let motions = program.as_ref().map(|program| program.outcome(&found));
     let there: Vec<&[f64]> = found.iter().filter_map(|f| f.readings.as_deref().ok()).collect();
-    let beyond = super::verify::beyond::targets(&args.identified, &pair.identified, &there);
+    let beyond = super::beyond::targets(&args.identified, &pair.identified, &there);
     beyond.iter().for_each(|(said, _)| progress::warn(said));
     let is_known = beyond.is_none_or(|(_, far)| !far);
     let summary = Summary::new(&rows, &found, motions.as_deref(), &pair);

@@ -122,9 +122,7 @@ impl Pair {
         });
         apart_mm
     }
-}
 
-impl Pair {
     /// What no measurement of a point told from the target's own place, and what therefore stays in another tool: the last link's length and zero.
     fn stays(&self, typed: Vector3<f64>, robot: &Utf8Path) -> Option<String> {
         let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);

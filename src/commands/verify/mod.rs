@@ -3,12 +3,12 @@
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
 //! sessions get placements of their own. The robots are those of their files.
 
-pub(super) mod beyond;
 mod recheck;
 
 use camino::Utf8Path;
 use serde::Serialize;
 
+use super::beyond;
 use super::{Outcome, Result};
 use crate::cli::Verify;
 use crate::config::Config;

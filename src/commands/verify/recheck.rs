@@ -2,9 +2,9 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::super::beyond::{self, Outside};
 use super::super::identify::{check_joints, read, source};
 use super::super::{Outcome, Result};
-use super::beyond::{self, Outside};
 use crate::cli::Verify;
 use crate::config::Config;
 use crate::diagnostic::{Status, count};

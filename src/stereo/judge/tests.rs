@@ -27,12 +27,6 @@ fn judge_with(corners: &Corners, second: Option<&Corners>) -> Judged {
     calibrated_and_judged(corners, second).1
 }
 
-fn judge_at(corners: &Corners, tolerance_mm: f64) -> Judged {
-    let asked = Asked { options: Options::default(), tolerance_mm, extent: Extent::Boards };
-    let (found, findings) = calibrate_standing(corners, &asked).unwrap();
-    synthetic::judged(&found, findings, Standards::default(), tolerance_mm)
-}
-
 fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, Judged) {
     let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
     let (found, findings) = calibrate_standing(corners, &asked).unwrap();
@@ -247,7 +241,7 @@ fn boards_that_hardly_tilt_do_not_vouch_for_depths() {
                 Vector3::new(draws.uniform(-tilt, tilt), 0.17 + draws.uniform(-tilt, tilt), draws.uniform(-0.4, 0.4));
             *pose = transform(turn, pose.translation.vector);
         }
-        let judged = judge_at(&world.corners(seed), 1.0);
+        let judged = judge(&world.corners(seed));
         let of = |what| line(&judged, what).value.unwrap();
         (of("calibration along the line of sight"), of("any length in the volume"))
     };

@@ -3,7 +3,7 @@
 //! In: the pairs at their start, how far each camera misses its own pictures and how far the pairs miss their rig. Out: both lenses with their
 //! covariance. Method: what moved between the two pictures of a pair says nothing of either lens, and each picture by itself is as good as
 //! ever; so each camera is solved alone, its board bent or flat. In the bundle of the pairs, whose corners then weigh by how far the pairs miss the
-//! rig, the same corners count once more by the square of both misseds' ratio; by so much less the lenses are known. Goes wrong: boards that
+//! rig, the same corners count once more by the square of the ratio of the two; by so much less the lenses are known. Goes wrong: boards that
 //! do not tell one of the cameras by itself; then no lens is known.
 
 use nalgebra::DMatrix;

@@ -75,10 +75,12 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
 
 /// Rows whose errors have the larger amounts of how a load in all of them would move the target: of two means of the amounts the larger one's.
 fn by_amount(errors_mm: &[Vector3<f64>], along: &[Vector3<f64>]) -> Vec<bool> {
-    let pairs = || errors_mm.iter().zip(along);
-    let mut order: Vec<(f64, f64)> = pairs()
-        .map(|(error, along)| (error.dot(along) / along.norm_squared().max(1e-12), along.norm_squared()))
-        .collect();
+    let amount = |(error, along): (&Vector3<f64>, &Vector3<f64>)| {
+        let weight = along.norm_squared();
+        (error.dot(along) / weight.max(1e-12), weight)
+    };
+    let amounts: Vec<(f64, f64)> = errors_mm.iter().zip(along).map(amount).collect();
+    let mut order = amounts.clone();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let sum = |part: &[(f64, f64)]| {
         part.iter().fold((0.0, 0.0), |(w, s), (amount, weight)| (w + weight, s + weight * amount))
@@ -89,7 +91,7 @@ fn by_amount(errors_mm: &[Vector3<f64>], along: &[Vector3<f64>]) -> Vec<bool> {
     };
     let at = (1..order.len()).max_by(|a, b| between(*a).total_cmp(&between(*b))).unwrap_or(0);
     let limit = order.get(at).map_or(f64::INFINITY, |(amount, _)| *amount);
-    pairs().map(|(error, along)| error.dot(along) / along.norm_squared().max(1e-12) >= limit).collect()
+    amounts.into_iter().map(|(amount, _)| amount >= limit).collect()
 }
 
 /// The rows that are under a load, what one robot leaves with it, and how far it moves each row's target where it is under it.

@@ -1,4 +1,4 @@
-//! Rows outside the ranges of the joints that a robot was identified in.
+//! Rows and targets outside the ranges of the joints that a robot was identified in.
 
 use camino::Utf8Path;
 
@@ -73,7 +73,7 @@ fn joints_outside(ranges: &[(f64, f64)], robot: &Robot, readings: &[&[f64]], nou
 /// That targets are where a robot was not identified, and whether one of its joints but the first is farther outside of its range than the range is
 /// wide. What was found over a range says of places so far beyond it what a short line says of a far point; the first joint turns the whole arm, and
 /// its own range tells nothing of the others' links.
-pub(in crate::commands) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Option<(String, bool)> {
+pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Option<(String, bool)> {
     let ranges = known::identified_over(file, robot)?;
     let joints = joints_outside(&ranges, robot, readings, "target");
     let is_far = |&(joint, _): &(usize, String)| {
