@@ -117,7 +117,7 @@ pub(super) fn along_sight(case: &Case) -> Option<Evidence> {
     let sigma_mm = volume.along_sight_mm.filter(|_| volume.extent == Extent::Boards)?;
     Some(Evidence::of_length(
         "calibration along the line of sight",
-        "tilt the board by 20 to 45 degrees about both axes, at several distances",
+        "tilt the board more, by 20 to 45 degrees about both axes, at several distances",
         Some(expansion.calibration * sigma_mm),
         case,
         format!(
