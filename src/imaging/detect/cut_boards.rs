@@ -60,15 +60,14 @@ const TURNS: [[f64; 3]; 3] = [[-0.5, 0.5, 0.2], [0.0, 0.0, 0.0], [0.7, -0.4, 1.1
 fn a_board_cut_by_borders_has_no_wrong_number() {
     let mut tally = Tally::default();
     for board in BOARDS {
-        for z in [250.0, 420.0] {
-            let places = [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0), (70.0, 0.0), (-40.0, 45.0)];
-            for ((x, y), turn) in places.into_iter().flat_map(|place| TURNS.map(|turn| (place, turn))) {
-                let (picture, truth) = Shot::of(board, turn, [x * z / 420.0, y * z / 420.0, z]).taken();
-                look(&board.parse().unwrap(), &picture, &truth, &format!("{board} {x} {y} {z} {turn:?}"), &mut tally);
-            }
+        let places = [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0), (70.0, 0.0), (-40.0, 45.0)];
+        for (k, ((x, y), turn)) in places.into_iter().flat_map(|place| TURNS.map(|turn| (place, turn))).enumerate() {
+            let z = [250.0, 420.0][k % 2];
+            let (picture, truth) = Shot::of(board, turn, [x * z / 420.0, y * z / 420.0, z]).taken();
+            look(&board.parse().unwrap(), &picture, &truth, &format!("{board} {x} {y} {z} {turn:?}"), &mut tally);
         }
     }
-    assert!(tally.numbered > 20 && tally.open > 20, "{tally:?}");
+    assert!(tally.numbered > 10 && tally.open > 10, "{tally:?}");
 }
 
 #[test]
@@ -76,29 +75,28 @@ fn a_board_behind_a_hand_has_no_wrong_number() {
     let mut tally = Tally::default();
     for board in [BOARDS[0], BOARDS[2]] {
         for (k, (z, turn)) in [(420.0, TURNS[0]), (560.0, TURNS[2])].into_iter().enumerate() {
-            // Some of them are cut by the border as well.
-            for x in [5.0, -70.0] {
-                let (picture, truth) = Shot { seed: k as u64, ..Shot::of(board, turn, [x, 3.0, z]) }.taken();
-                let board: Board = board.parse().unwrap();
-                let (first, last) = (truth[0], truth[board.index(board.columns() - 1, board.rows() - 1)]);
-                for (share, grey) in [(0.25, 90), (0.4, 190), (0.6, 120)] {
-                    // From the first corner's side or from the last one's, along the columns or aslant.
-                    for along in [truth[board.columns() - 1] - first, last - first] {
-                        for ahead in [true, false] {
-                            let hidden = with_pixels(&picture, |image, x, y| {
-                                let at = (Point2::new(x as f64, y as f64) - first).dot(&along) / along.norm_squared();
-                                let covers = if ahead { at < share } else { at > 1.0 - share };
-                                if covers { grey } else { image.pixels[y * image.width + x] }
-                            });
-                            let what = format!("{board} {k} {x} {share} {grey} {along} {ahead}");
-                            look(&board, &hidden, &truth, &what, &mut tally);
-                        }
+            // The nearer one is cut by the border as well.
+            let x = [-70.0, 5.0][k];
+            let (picture, truth) = Shot { seed: k as u64, ..Shot::of(board, turn, [x, 3.0, z]) }.taken();
+            let board: Board = board.parse().unwrap();
+            let (first, last) = (truth[0], truth[board.index(board.columns() - 1, board.rows() - 1)]);
+            for (share, grey) in [(0.25, 90), (0.4, 190), (0.6, 120)] {
+                // From the first corner's side or from the last one's, along the columns or aslant.
+                for along in [truth[board.columns() - 1] - first, last - first] {
+                    for ahead in [true, false] {
+                        let hidden = with_pixels(&picture, |image, x, y| {
+                            let at = (Point2::new(x as f64, y as f64) - first).dot(&along) / along.norm_squared();
+                            let covers = if ahead { at < share } else { at > 1.0 - share };
+                            if covers { grey } else { image.pixels[y * image.width + x] }
+                        });
+                        let what = format!("{board} {k} {x} {share} {grey} {along} {ahead}");
+                        look(&board, &hidden, &truth, &what, &mut tally);
                     }
                 }
             }
         }
     }
-    assert!(tally.open > 20, "{tally:?}");
+    assert!(tally.open > 10, "{tally:?}");
 }
 
 #[test]

@@ -63,7 +63,7 @@ fn judged(corners: &Corners, moves: &[&str], tolerance_mm: f64) -> (Judged, Verd
 
 #[test]
 fn moves_that_are_as_stated_agree_and_scatter_as_they_say() {
-    const SEEDS: u64 = 150;
+    const SEEDS: u64 = 50;
     let (mut contradict, mut turned, mut squares) = (0, 0, 0.0);
     for seed in 0..SEEDS {
         // The block is as far off as it is stated.
@@ -77,9 +77,9 @@ fn moves_that_are_as_stated_agree_and_scatter_as_they_say() {
     }
     let scatter = (squares / SEEDS as f64).sqrt();
     // At most one in a hundred of either: of 600 seeds none contradict and 6 are said to have turned.
-    assert!(contradict <= 5 && turned <= 5, "{contradict} contradict, {turned} turned of {SEEDS}");
-    // So many draws know a standard deviation to 6 %.
-    assert!((0.8..1.2).contains(&scatter), "{scatter}");
+    assert!(contradict <= 3 && turned <= 3, "{contradict} contradict, {turned} turned of {SEEDS}");
+    // So many draws know a standard deviation to 10 %.
+    assert!((0.7..1.3).contains(&scatter), "{scatter}");
 }
 
 #[test]
