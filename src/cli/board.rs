@@ -19,7 +19,7 @@ pub struct Target {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<Squares>,
     /// Side of a square, mm; key `target_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
+    #[arg(long, alias = "square", value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
     pub square_mm: Option<f64>,
 }
 

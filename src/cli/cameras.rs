@@ -70,7 +70,7 @@ pub struct CameraCheck {
     #[arg(long, value_name = "CxR")]
     pub squares: Option<AskedSquares>,
     /// Side of a square, mm; key `check_board.square_mm` [default: 10]
-    #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
+    #[arg(long, alias = "square", value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
     pub square_mm: Option<f64>,
     /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square to that of the last
     /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other

@@ -19,12 +19,22 @@ pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     if changed.is_some() { Status::OutOfTolerance } else { advised }
 }
 
-/// Warns of what a rig's own calibration says against it, and gives it. What is made with the rig states its own uncertainty: the status is not
-/// the rig's.
-pub fn heed_rig(rig: &Calibrated) -> Vec<String> {
-    let doubts = rig.doubts();
-    doubts.iter().for_each(progress::warn);
-    doubts
+/// What speaks against a rig.
+pub struct RigDoubts {
+    pub said: Vec<String>,
+    /// With which status a command that uses the rig ends at best.
+    pub status: Status,
+}
+
+/// Warns of what a rig's own calibration says against it, and a check that was made of it since. What is made with a rig that did not pass states
+/// its own uncertainty, so that the status is not the rig's; of one that changed it states too little.
+pub fn heed_rig(rig: &Calibrated, file: &Utf8Path) -> RigDoubts {
+    let changed =
+        file.file_name().zip(file.parent()).and_then(|(name, folder)| changed_since(folder, "recheck.json", name));
+    let status = if changed.is_some() { Status::OutOfTolerance } else { Status::Done };
+    let said: Vec<String> = changed.into_iter().chain(rig.doubts()).collect();
+    said.iter().for_each(progress::warn);
+    RigDoubts { said, status }
 }
 
 /// What the last check beside a result says against it, if it was of that very result.

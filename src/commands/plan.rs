@@ -8,7 +8,7 @@ use super::identify::robot_file;
 use super::{Outcome, Result};
 use crate::cli::{Plan as Arguments, PlanKind};
 use crate::config::{self, Config};
-use crate::diagnostic::{Status, count};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -39,7 +39,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = calibration::file(args.calibration.as_deref(), &out, &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
-    heed_rig(&calibrated);
+    let doubts = heed_rig(&calibrated, &rig_file);
     let Calibrated { rig, noise, pair_excess, .. } = calibrated;
     let robot_file = robot_file(args.robot.as_deref());
     let robot = match &robot_file {
@@ -81,7 +81,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::plan::page(&scene, &robot, &found, &record)?;
     report::page::write(&out, "plan.html", page)?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status: doubts.status })
 }
 
 /// Joints that turn and have no limits stay within half a turn either way: what they really can, the file does not say.

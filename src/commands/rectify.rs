@@ -4,7 +4,7 @@ use camino::Utf8Path;
 use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
-use super::heed::heed_rig;
+use super::heed::{RigDoubts, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Rectify;
 use crate::config::Config;
@@ -35,7 +35,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
-    let mut doubts = heed_rig(&calibrated);
+    let RigDoubts { said: mut doubts, status: at_best } = heed_rig(&calibrated, &rig_file);
     let calibration::Calibrated { rig, board, volume, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
@@ -89,7 +89,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
-    Ok(Outcome { stdout, status })
+    Ok(Outcome { stdout, status: status.or_worse(at_best) })
 }
 
 /// Says whether rows do not agree; with which status the run then ends at best.

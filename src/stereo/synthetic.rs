@@ -22,8 +22,13 @@ pub(crate) const BROWN4: Options = Options { lens: Some(Lens::Brown4), shape: So
 /// A calibration judged by its held-out lengths.
 pub(crate) fn judged(found: &Calibration, findings: Vec<Finding>, standards: Standards, tolerance_mm: f64) -> Judged {
     let accuracy = held_out::hold_out(found, None).unwrap();
-    let demand =
-        Demand { tolerance_mm, board_uncertainty_mm: None, extent: Extent::Boards, lens_pairs: LensPairs::default() };
+    let demand = Demand {
+        tolerance_mm,
+        board_uncertainty_mm: None,
+        extent: Extent::Boards,
+        lens_pairs: LensPairs::default(),
+        size_assumed: None,
+    };
     Judged::new(found, findings, accuracy, standards, &demand)
 }
 

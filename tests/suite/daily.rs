@@ -201,6 +201,9 @@ fn a_check_says_what_it_judged_and_by_what() {
     // A second board: here the same one once more, its corners first, so that its pictures are not known again.
     let said = check(&[&all[..], &["--check-images", "check"]].concat());
     assert!(said.contains("second board: 8 pairs, largest error 0.0") && !said.contains("with a ruler"), "{said}");
+    // A board that is known no better than that is what has to be measured, not the pictures.
+    let said = check(&[&all[..], &["--board-uncertainty-mm", "0.2"]].concat());
+    assert!(said.contains("next: measure the board's own lengths more finely"), "{said}");
     // Five pairs are too few poses, and that has a plain name.
     let said = check(&["--corners", "five.csv"]);
     assert!(said.contains("what lengths can be trusted to is not known until these checks are passed: "), "{said}");
@@ -222,8 +225,7 @@ fn a_check_says_what_it_judged_and_by_what() {
     std::fs::write(at.join("noisy.csv"), noisy).unwrap();
     let bad = check(&["--corners", "noisy.csv", "--force"]);
     assert!(bad.contains("no length can be trusted: of one of 70 mm an error of "), "{bad}");
-    let said = check(&["--corners", "five.csv"]);
-    assert!(said.contains("number of different poses"), "{said}");
+    check(&["--corners", "five.csv"]);
     let evidence = json(&at.join("said/camera-check.json"))["evidence"].to_string();
     assert!(evidence.contains("pairs with poses of their own"), "the names in the file are the contract's");
 }
@@ -272,6 +274,15 @@ fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
     let said = report();
     assert_eq!(said.status.code(), Some(1));
     assert!(stderr(&said).contains("calibration.json no longer holds by before/recheck.json: "), "{}", stderr(&said));
+    // Nor is it used or handed on without a word.
+    std::fs::create_dir_all(at.join("alone")).unwrap();
+    std::fs::copy(at.join("before/calibration.json"), at.join("alone/calibration.json")).unwrap();
+    let export = ["export", "calibration", "--format", "opencv", "--out", "handed-on", "--force", "--calibration"];
+    for (file, status) in [("before/calibration.json", 1), ("alone/calibration.json", 0)] {
+        let handed = stereocal(at, &[&export[..], &[file]].concat());
+        assert_eq!(handed.status.code(), Some(status), "{}", stderr(&handed));
+        assert_eq!(stderr(&handed).contains("no longer holds by before/recheck.json: "), status == 1);
+    }
     // Lenses that were told by these very pairs count twice, and a board that calibrated is no second one.
     let known =
         ["camera-check", "old", "--intrinsics", "before/calibration.json", "--out", "known", "--tolerance-mm", "1"];

@@ -49,6 +49,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let pairing = pairing(args, &out)?;
     let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
     demand.board_uncertainty_mm = demand.board_uncertainty_mm.or(by_caliper_mm);
+    demand.size_assumed = size_assumed(args, config);
+    demand.size_assumed.iter().for_each(progress::warn);
     demand.lens_pairs = pairs_of_lenses(args, pairing.as_ref(), &out);
     demand.lens_pairs.statement().iter().for_each(progress::warn);
     let known = known_lenses(args)?;
@@ -107,6 +109,7 @@ fn demand(args: &CameraCheck, config: &Config) -> Result<Demand> {
         board_uncertainty_mm: args.board_uncertainty_mm,
         extent: args.volume.unwrap_or_default(),
         lens_pairs: LensPairs::default(),
+        size_assumed: None,
     })
 }
 
@@ -158,7 +161,6 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
     let squares = squares(args, pairing)?;
     let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
     let Some(extent) = args.measured_mm else {
-        config.check_board.size_is_assumed(args.board, args.square_mm).into_iter().for_each(progress::warn);
         return Ok((warm(args, drawn)?, None));
     };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
@@ -171,6 +173,12 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
         drawn.side_said()
     ));
     Ok((warm(args, board)?, Some(uncertainty_mm)))
+}
+
+/// That nobody said how large the squares are, neither as drawn nor as printed.
+fn size_assumed(args: &CameraCheck, config: &Config) -> Option<String> {
+    let printed = args.measured_mm.is_some();
+    config.check_board.size_is_assumed(args.board, args.square_mm).filter(|_| !printed)
 }
 
 /// The board, as large as its temperature makes it.

@@ -7,7 +7,6 @@ use super::heed::heed_rig;
 use super::{Outcome, Result};
 use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
 use crate::config::Config;
-use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration as rig;
@@ -26,7 +25,7 @@ fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Ou
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = rig::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = rig::read(&rig_file)?;
-    heed_rig(&calibrated);
+    let doubts = heed_rig(&calibrated, &rig_file);
     let rig = calibrated.rig;
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&rig_file]);
     let files = match args.format {
@@ -40,5 +39,5 @@ fn calibration(args: &ExportCalibration, config: &Config, run: Run) -> Result<Ou
         out.write(file.name, file.text.as_bytes())?;
         stdout.push_str(&format!("{}\n", out.join(file.name)));
     }
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status: doubts.status })
 }

@@ -7,11 +7,11 @@ use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::heed::heed_rig;
+use super::heed::{RigDoubts, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Measure;
 use crate::config::Config;
-use crate::diagnostic::{Status, count};
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -34,7 +34,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
-    let (known, doubts) = knowledge(args, config, &rig_file)?;
+    let (known, RigDoubts { said: doubts, status }) = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;
     if args.watch {
         let wanted = Wanted {
@@ -77,7 +77,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "measure.html", page)?;
     end(&series, &known, &out)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
-    Ok(Outcome { stdout, status: Status::Done })
+    Ok(Outcome { stdout, status })
 }
 
 /// Where the poses are: in the folder of the pictures; of two folders in the one that holds both, else in one of them.
@@ -90,10 +90,10 @@ fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
 }
 
 /// The rig, the target and what is known of both; what is said against the rig.
-fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Knowledge, Vec<String>)> {
+fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Knowledge, RigDoubts)> {
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let calibrated = calibration::read(rig_file)?;
-    let doubts = heed_rig(&calibrated);
+    let doubts = heed_rig(&calibrated, rig_file);
     let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(

@@ -32,7 +32,7 @@ pub struct Judged {
 }
 
 /// What lengths are judged by.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Demand {
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
@@ -42,6 +42,8 @@ pub struct Demand {
     pub extent: Extent,
     /// The pairs from which the lenses were known beforehand.
     pub lens_pairs: LensPairs,
+    /// That nobody said how large the board is, where it is so.
+    pub size_assumed: Option<String>,
 }
 
 impl Judged {
@@ -68,7 +70,9 @@ impl Judged {
             findings,
         };
         let evidence = ledger(&Case { calibration, facts: &facts });
-        let mut warnings: Vec<Warning> = calibration.rig().unusual().into_iter().map(Warning::from).collect();
+        let unusual = calibration.rig().unusual();
+        let mut warnings: Vec<Warning> =
+            demand.size_assumed.iter().cloned().chain(unusual).map(Warning::from).collect();
         // The held-out lengths are the result itself and stand in its first line.
         let doubts = evidence.iter().skip(1).filter(|line| line.allows != Verdict::Pass);
         warnings.extend(doubts.map(Evidence::warning));

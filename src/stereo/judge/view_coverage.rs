@@ -32,6 +32,8 @@ pub const ENOUGH_PAIRS: usize = 10;
 pub struct Coverage {
     /// Pairs that were used.
     pub pairs: usize,
+    /// Whether both lenses were known before, so that the views need not tell them.
+    pub lenses_known: bool,
     /// Range of the boards' tilts about the horizontal and the vertical axis, deg.
     pub tilts_deg: [f64; 2],
     /// Nearest and farthest board, mm.
@@ -70,12 +72,16 @@ impl Coverage {
         });
         let empty = [0, 1].map(|side| empty_region(fields[side], &common[side]));
         let tilts_deg = [x_most - x_least, y_most - y_least];
-        Coverage { pairs: calibration.views.len(), tilts_deg, depths_mm, corner_depths_mm, field_shares, empty }
+        let (pairs, lenses_known) = (calibration.views.len(), calibration.known_sides == [true; 2]);
+        Coverage { pairs, lenses_known, tilts_deg, depths_mm, corner_depths_mm, field_shares, empty }
     }
 
     /// What should be photographed next; empty where the views suffice.
     pub fn advice(&self) -> Vec<String> {
         let mut advice = Vec::new();
+        if self.lenses_known {
+            return advice;
+        }
         let pairs = self.pairs;
         if pairs < ENOUGH_PAIRS {
             advice.push(format!(

@@ -90,11 +90,17 @@ mod tests {
     #[test]
     fn pictures_of_two_moments_tell_their_lenses() {
         let options = Options { lens: Some(Lens::Brown5), shape: Some(false), known: None };
-        let (mut off, mut count) = (0.0, 0.0);
+        let (mut off, mut count, mut link) = (0.0, 0.0, 0.0);
         for turn_deg in [0.02, 0.05, 0.1] {
             for seed in 1..=6 {
                 let world = World::new(10, seed);
                 let found = calibrate(&world.corners_by_hand(seed, turn_deg), &options).unwrap();
+                let (rig, at) = (found.rig().right_from_left, found.layout.transform_start());
+                let truth = world.rig.right_from_left;
+                let turn = (rig.rotation * truth.rotation.inverse()).scaled_axis();
+                let shift = rig.translation.vector - truth.translation.vector;
+                link += (0..3).map(|k| turn[k].powi(2) / found.uncertainty.shared[(at + k, at + k)]).sum::<f64>();
+                link += (3..6).map(|k| shift[k - 3].powi(2) / found.uncertainty.shared[(at + k, at + k)]).sum::<f64>();
                 for (at, [found_px, true_px]) in [
                     (0, [found.rig().left.fx, world.rig.left.fx]),
                     (found.layout.camera_start(Side::Right), [found.rig().right.fx, world.rig.right.fx]),
@@ -108,6 +114,9 @@ mod tests {
             }
         }
         assert!((0.4..1.6).contains(&(off / count)), "{}", off / count);
+        // What moved is counted once: as each pair's own motion, and not as corners that scatter as well.
+        let link = link / (6 * 18) as f64;
+        assert!((0.6..1.4).contains(&link), "{link}");
     }
 
     #[test]

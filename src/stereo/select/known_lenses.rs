@@ -16,7 +16,7 @@ use crate::stereo::data::in_use;
 use crate::stereo::model::{KnownLenses, Layout};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
-use crate::stereo::select::options::{Choice, Options, SIMPLEST};
+use crate::stereo::select::options::{Choice, KnownScatter, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::Problem;
 use crate::stereo::{Error, Rig};
@@ -80,7 +80,7 @@ pub fn choose(start: &Problem, board: &Board, known: &KnownLenses, options: &Opt
         layout: known.layout(lens, shape),
         near: Some(problem.values),
         priors: solved.problem.priors,
-        scatter: Some(scatter),
+        scatter: Some(KnownScatter { lenses: scatter, pairs: scatter }),
         scores: Vec::new(),
     })
 }

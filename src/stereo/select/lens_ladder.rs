@@ -13,7 +13,7 @@ use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
 use crate::stereo::pairs::missed::Missed;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
-use crate::stereo::select::options::{Choice, Options, SIMPLEST};
+use crate::stereo::select::options::{Choice, KnownScatter, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::select::{each_alone, known_lenses};
 use crate::stereo::solve::uncertainty;
@@ -38,7 +38,10 @@ pub fn choose(start: &Problem, missed: Missed, board: &Board, options: &Options)
     let paired = of_pairs.as_ref().ok().and_then(of);
     let Some(known) = each_alone::lenses(start, board, lens, paired.as_ref(), missed) else { return of_pairs };
     let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
-    Ok(Choice { scores, ..known_lenses::choose(start, board, &known, options)? })
+    let choice = known_lenses::choose(start, board, &known, options)?;
+    // How the pairs scatter, these pairs tell themselves.
+    let scatter = choice.scatter.map(|scatter| KnownScatter { pairs: 1.0, ..scatter });
+    Ok(Choice { scores, scatter, ..choice })
 }
 
 fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {

@@ -20,6 +20,15 @@ pub struct Options {
     pub known: Option<KnownLenses>,
 }
 
+/// Variances of the shared numbers over what the weighted corners alone say, where lenses are known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownScatter {
+    /// By so much more the lenses count than the corners do.
+    pub lenses: f64,
+    /// So much the pairs scatter at least: an earlier calibration may have had more of them, and know it better.
+    pub pairs: f64,
+}
+
 /// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
@@ -29,8 +38,8 @@ pub struct Choice {
     pub near: Option<Values>,
     /// What is expected of that model.
     pub priors: Priors,
-    /// Where lenses are known: variance of the shared numbers over what the weighted corners alone say.
-    pub scatter: Option<f64>,
+    /// Where lenses are known: beside what scatter.
+    pub scatter: Option<KnownScatter>,
     /// Every lens of the ladder; empty where the lens was forced.
     pub scores: Vec<LensScore>,
 }

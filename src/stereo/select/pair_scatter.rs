@@ -41,6 +41,8 @@ pub struct Jackknife<'a> {
     pub without: &'a [Option<Without>],
     /// What the covariance is at least, over the one by the corners' noise: pairs of an earlier calibration may say so.
     pub least: f64,
+    /// The same of what is expected of lenses that are known, which counts by so much more than the corners do.
+    pub lenses: f64,
 }
 
 impl Jackknife<'_> {
@@ -51,7 +53,7 @@ impl Jackknife<'_> {
         let all: Option<Vec<&Without>> = self.without.iter().map(Option::as_ref).collect();
         match all.and_then(|all| self.enlarge(by_noise, inflation, &all)) {
             Some((covariance, ratio)) => (covariance, PairScatter { groups, ratio: Some(ratio) }),
-            None => (by_noise * self.least, PairScatter { groups, ratio: None }),
+            None => (by_noise * self.lenses, PairScatter { groups, ratio: None }),
         }
     }
 
@@ -90,7 +92,10 @@ impl Jackknife<'_> {
         let ratio = scatter.trace() / n as f64 / stretch;
         let moved = pair_motion::covariance(self.equations, self.layout, &own, inflation);
         let by_motion = moved.map_or(DMatrix::zeros(n, n), |moved| &inverse_root * moved * inverse_root.transpose());
-        let floor = DMatrix::identity(n, n) * self.least + &by_motion;
+        // What is expected counts by the factor beside the corners, so that it is known as much worse than the equations say.
+        let expected =
+            root.transpose() * &self.equations.prior.matrix * &root * ((self.lenses - self.least) / inflation);
+        let floor = DMatrix::identity(n, n) * self.least + expected + &by_motion;
         let shrunk = shrunk(&scatter, &steps, DMatrix::identity(n, n) + by_motion) / stretch;
         let (floor_root, floor_inverse) = roots(&floor)?;
         let eigen = (&floor_inverse * shrunk * floor_inverse.transpose()).symmetric_eigen();

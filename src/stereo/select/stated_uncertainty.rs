@@ -14,6 +14,7 @@ use crate::stereo::data::Noise;
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
+use crate::stereo::select::options::KnownScatter;
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
 use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
 use crate::stereo::solve::{Equations, Problem, Solved, Uncertainty};
@@ -47,24 +48,24 @@ pub struct Stated {
     pub witnesses: Vec<Witness>,
 }
 
-/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to `known` times these at least: what
-/// the numbers scatter by where lenses are known. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers scatter by where lenses are
+/// `known` at least. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
     by_noise: Uncertainty,
     inflation: f64,
     scores: &[LensScore],
-    known: Option<f64>,
+    known: Option<KnownScatter>,
     print_excess: f64,
 ) -> Stated {
-    let least = (known.unwrap_or(1.0) / inflation).max(1.0);
-    let found = scattered(solved, layout, &by_noise.shared, inflation, least);
+    let [lenses, pairs] = known.map_or([1.0; 2], |known| [known.lenses, known.pairs].map(|v| (v / inflation).max(1.0)));
+    let found = scattered(solved, layout, &by_noise.shared, inflation, [lenses, pairs]);
     let Some((equations, mut shared, pair_scatter)) = found else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
-        return Stated { uncertainty: by_noise.scaled(least), pair_scatter, witnesses: Vec::new() };
+        return Stated { uncertainty: by_noise.scaled(lenses), pair_scatter, witnesses: Vec::new() };
     };
-    let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(least);
+    let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(lenses);
     let richer = richer(layout, scores, known.is_some());
     let witnesses = witnesses(&solved.problem, layout, richer, factor * print_excess);
     // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
@@ -82,7 +83,7 @@ pub fn state(
 pub fn told_scatter(solved: &Solved, layout: &Layout, board: &Board) -> Option<f64> {
     let inflation = solved.inflation(board);
     let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
-    let ratio = scattered(solved, layout, &by_noise.shared, inflation, 1.0)?.2.ratio?;
+    let ratio = scattered(solved, layout, &by_noise.shared, inflation, [1.0; 2])?.2.ratio?;
     Some(inflation * ratio.max(1.0))
 }
 
@@ -110,15 +111,16 @@ fn scattered(
     layout: &Layout,
     by_noise: &DMatrix<f64>,
     inflation: f64,
-    least: f64,
+    [lenses, least]: [f64; 2],
 ) -> Option<(Equations, DMatrix<f64>, PairScatter)> {
     let Problem { views, values, .. } = &solved.problem;
     let groups = cross_validation::groups(views, &values.poses);
     let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
     let sure = WORST_FOCAL_SIGMA;
     let without = cross_validation::leave_out(&curvature, &equations, layout, &values.shared, &groups, sure);
+    let (group_of, without) = (groups.as_slice(), without.as_slice());
     let jackknife =
-        Jackknife { equations: &equations, curvature: &curvature, group_of: &groups, layout, without: &without, least };
+        Jackknife { equations: &equations, curvature: &curvature, group_of, layout, without, least, lenses };
     let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
     Some((equations, shared, pair_scatter))
 }

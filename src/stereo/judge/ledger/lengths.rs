@@ -22,10 +22,18 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     } else {
         String::new()
     };
+    let board_mm = worst.expansion.board_mm.unwrap_or_default();
+    // What is left of the tolerance beside an uncertain board decides nothing about pictures.
+    let remedy = if worst.at_most_mm() - board_mm <= case.facts.tolerance_mm && 2.0 * board_mm > case.facts.tolerance_mm
+    {
+        "measure the board's own lengths more finely, and give that: `--board-uncertainty-mm`, or `--measured-mm` with more digits"
+    } else {
+        "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
+         or the `--tolerance-mm` that your robot needs"
+    };
     Evidence {
         what: "held-out lengths",
-        remedy: "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
-                 or the `--tolerance-mm` that your robot needs",
+        remedy,
         value: Some(worst.at_most_mm()),
         limit: Some(case.facts.tolerance_mm),
         unit: "mm",

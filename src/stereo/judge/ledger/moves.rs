@@ -11,9 +11,17 @@ pub const KNOWN_MOVE: &str = "known move";
 
 /// A line a move.
 pub(super) fn known_moves(case: &Case) -> Vec<Evidence> {
+    let moves = &case.facts.standards.moves;
+    let told = moves.causes();
+    let remedy = match told[..] {
+        [] => "slide the board farther, or by a length that is known better, without turning it",
+        [Cause::OtherBoard] => "give the squares the side that the moves tell, `--square-mm`",
+        [Cause::KnownMove] => "look up what the moves were: one of them at least is not as stated",
+        _ => "state a move of another length as well: it tells a wrong side of the squares from a wrong move",
+    };
     let line = |value, allows, detail| Evidence {
         what: KNOWN_MOVE,
-        remedy: "slide the board farther, or by a length that is known better, without turning it",
+        remedy,
         value,
         limit: Some(case.facts.tolerance_mm),
         unit: "mm",
@@ -21,13 +29,16 @@ pub(super) fn known_moves(case: &Case) -> Vec<Evidence> {
         detail,
     };
     let length_mm = case.facts.volume.length_mm;
-    // Moves that contradict each other are no proof against the rig.
-    let told = case.facts.standards.moves.causes();
+    let of_move = |known: &KnownMove| known.verdict(length_mm, case.facts.tolerance_mm);
+    let is_confirmed = told.is_empty() && moves.measured.iter().any(|known| of_move(known) == Verdict::Pass);
     let measured = |known: &KnownMove| {
-        let mut allows = known.verdict(length_mm, case.facts.tolerance_mm);
-        if allows == Verdict::Fail && told == [Cause::KnownMove] {
-            allows = Verdict::Undecided;
-        }
+        let allows = match of_move(known) {
+            // Moves that contradict each other are no proof against the rig.
+            Verdict::Fail if told == [Cause::KnownMove] => Verdict::Undecided,
+            // One that agrees and tells less takes nothing from one that tells enough.
+            Verdict::Undecided if is_confirmed => Verdict::Pass,
+            allows => allows,
+        };
         let detail = format!(
             "{}. The value is what the scale error with its uncertainty does to a length of {length_mm:.0} mm",
             known.statement()
@@ -35,12 +46,5 @@ pub(super) fn known_moves(case: &Case) -> Vec<Evidence> {
         line(Some((known.scale_error.abs() + known.expanded()) * length_mm), allows, detail)
     };
     let missing = |reason: &String| line(None, Verdict::Undecided, reason.clone());
-    case.facts
-        .standards
-        .moves
-        .measured
-        .iter()
-        .map(measured)
-        .chain(case.facts.standards.moves.missing.iter().map(missing))
-        .collect()
+    moves.measured.iter().map(measured).chain(moves.missing.iter().map(missing)).collect()
 }

@@ -122,6 +122,24 @@ fn a_move_that_is_stated_wrong_is_seen_and_others_tell_it_from_the_scale() {
 }
 
 #[test]
+fn a_move_that_agrees_and_tells_less_takes_nothing_from_one_that_tells_enough() {
+    for seed in [50, 51] {
+        let corners = slid(seed, &[(5.0, 0.0), (20.0, 0.0)]).corners(seed);
+        let tells_mm = |stated: &str| {
+            let (judged, ..) = judged(&corners, &[stated], 1.0);
+            judged.evidence.iter().find(|line| line.what == "known move").and_then(|line| line.value).unwrap()
+        };
+        let [short, long] = ["5mm:11,12", "20mm:12,13"];
+        let tolerance_mm = 0.5 * (tells_mm(short) + tells_mm(long));
+        assert_eq!(judged(&corners, &[short], tolerance_mm).1, Verdict::Undecided);
+        assert_eq!(judged(&corners, &[short, long], tolerance_mm).1, Verdict::Pass);
+        // One that is wrong is not covered by it.
+        let wrong = judged(&corners, &["5.1mm:11,12", long], tolerance_mm).1;
+        assert_ne!(wrong, Verdict::Pass);
+    }
+}
+
+#[test]
 fn a_board_that_turned_is_said_with_its_turn_and_is_no_proof() {
     for deg in [0.05, 0.5] {
         for seed in 30..34 {
