@@ -48,3 +48,25 @@ pub fn constant_joints(set: &Dataset) -> Vec<String> {
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
     (0..set.joint_count()).filter(constant).map(|joint| (joint + 1).to_string()).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::synthetic;
+    use crate::measurements::Role;
+
+    #[test]
+    fn poses_that_the_robot_came_back_to_are_those_of_one_group_at_the_same_joints() {
+        let row = |name: &str, group: &str, second: f64| {
+            let seen = synthetic::seen_at(Point3::new(1.0, 2.0, second));
+            synthetic::row(name.to_owned(), group, Role::Sample, vec![10.0, second], seen)
+        };
+        let there_and_back = ["a", "b", "a2", "c"].into_iter().zip([20.0, 30.0, 20.0, 40.0]);
+        let mut rows: Vec<_> = there_and_back.map(|(name, second)| row(name, "1", second)).collect();
+        // The same joints seen from elsewhere say nothing of the repeatability.
+        rows.push(row("d", "2", 30.0));
+        let set = Dataset::new(&rows).unwrap();
+        assert_eq!(repeated(&set), ["a", "a2"]);
+        assert_eq!(constant_joints(&set), ["1"]);
+    }
+}

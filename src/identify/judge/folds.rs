@@ -89,6 +89,8 @@ fn mean_of_repeats(errors: Vec<RowError>) -> Option<RowError> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Matrix3;
+
     use super::*;
     use crate::identify::synthetic;
     use crate::measurements::RobotPose;
@@ -108,5 +110,23 @@ mod tests {
             assert_eq!(of_row[20], of_row[40]);
         }
         assert_eq!(folds(&set, &rows), folds(&set, &rows));
+    }
+
+    #[test]
+    fn a_row_that_was_left_out_several_times_has_one_error_of_mean_size() {
+        let set = Dataset::new(&synthetic::world(60, 0.01, 1).rows).unwrap();
+        let error = |row: usize, distance_mm: f64, point_mm: [f64; 3]| RowError {
+            row,
+            distance_mm: Some(distance_mm),
+            point_mm: Some(point_mm.into()),
+            covariance_mm2: Matrix3::zeros(),
+        };
+        let once = error(3, 2.0, [1.0, 0.0, 0.0]);
+        let errors = [error(7, -1.0, [0.0, 3.0, 4.0]), once.clone(), error(7, 3.0, [0.0, 0.0, -15.0])];
+        let [first, second] = &one_a_row(&set, errors.into_iter())[..] else { panic!("two rows") };
+        assert_eq!(first, &once);
+        // Sizes are averaged, for signed errors could cancel; sign and direction are the first's.
+        assert_eq!((second.row, second.distance_mm), (7, Some(-2.0)));
+        assert!((second.point_mm.unwrap() - Vector3::new(0.0, 6.0, 8.0)).norm() < 1e-12);
     }
 }

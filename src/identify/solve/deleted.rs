@@ -231,3 +231,28 @@ fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64)
     let variance = predicted + identity * (weight * weight);
     Some((residual.dot(&Cholesky::new((&variance + variance.transpose()) / 2.0)?.solve(&residual)), odds))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::data::dataset::Dataset;
+    use crate::identify::settings::Settings;
+    use crate::identify::solve::robust::Loss;
+    use crate::identify::synthetic;
+    use crate::measurements::Role;
+
+    /// Verify rows of a placement of their own have nothing to be held against but each other.
+    #[test]
+    fn a_row_that_is_off_is_found_in_a_placement_of_which_no_row_is_fitted() {
+        let mut world = synthetic::planned(80, 0, 25.0, 0.02, 5, &|_| {});
+        world.rows.iter_mut().filter(|row| row.at.group == "g3").for_each(|row| row.at.role = Role::Verify);
+        let bad = world.rows.iter().rposition(|row| row.at.group == "g3").unwrap();
+        synthetic::point(&mut world.rows[bad]).z += 5.0;
+        let (set, settings) = (Dataset::new(&world.rows).unwrap(), Settings::default());
+        let (fitted, parameters) = (set.fit_rows(), world.nominal.mdh_parameters());
+        let others = set.verify_rows();
+        assert!(others.len() >= LEAST_ALONE && set.of_group(&fitted, set.poses[bad].group).is_empty());
+        let robust = Task::plain(&set, &world.nominal, &parameters, &fitted, &settings).robust(Loss::Biweight).unwrap();
+        assert_eq!(robust.far_off(&others, settings.outlier_sigmas), [bad]);
+    }
+}

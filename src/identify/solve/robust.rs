@@ -214,3 +214,23 @@ fn biweight(u: f64) -> f64 {
     let inside = 1.0 - (u / BIWEIGHT).powi(2);
     inside.max(0.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::data::dataset::Dataset;
+    use crate::identify::settings::Settings;
+    use crate::identify::synthetic;
+
+    /// What is left of a fit is the noise, whatever a few rows are off by.
+    #[test]
+    fn the_typical_residual_is_that_of_the_rows_that_fit() {
+        let mut world = synthetic::planned(80, 0, 25.0, 0.05, 6, &|_| {});
+        world.rows.iter_mut().skip(10).step_by(16).for_each(|row| synthetic::point(row).x += 10.0);
+        let (set, settings) = (Dataset::new(&world.rows).unwrap(), Settings::default());
+        let (rows, parameters) = (set.fit_rows(), world.nominal.mdh_parameters());
+        let task = Task::plain(&set, &world.nominal, &parameters, &rows, &settings);
+        let left_mm = task.robust(Loss::Absolute).unwrap().typical_mm();
+        assert!((0.02..0.06).contains(&left_mm), "{left_mm}");
+    }
+}

@@ -247,3 +247,25 @@ fn scaled(distances: &DMatrix<Option<f64>>, of: &[usize]) -> Vec<Vector3<f64>> {
     };
     (0..n).map(|target| Vector3::from_fn(|axis, _| along(target, axis).unwrap_or(0.0))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn body(places_mm: &[[f64; 3]]) -> Body {
+        Body { places_mm: places_mm.iter().map(|place| Some(Vector3::from(*place))).collect() }
+    }
+
+    /// Three targets of a flat body can stand on a line, about which nothing tells the turn.
+    #[test]
+    fn a_pose_tells_the_turn_by_three_targets_off_a_line() {
+        let body = body(&[[-40.0, 0.0, 0.0], [0.0, 0.0, 0.0], [40.0, 0.0, 0.0], [0.0, 50.0, 0.0]]);
+        let tells = |targets: &[usize]| {
+            let sighting =
+                |&target: &usize| Sighting { target, point_mm: Point3::origin(), precision: Matrix3::identity() };
+            body.tells_turn(&targets.iter().map(sighting).collect::<Vec<_>>())
+        };
+        assert!(tells(&[0, 1, 3]) && tells(&[0, 1, 2, 3]));
+        assert!(!tells(&[0, 1, 2]) && !tells(&[0, 3]));
+    }
+}

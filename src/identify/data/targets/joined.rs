@@ -159,3 +159,27 @@ fn by_target(rows: &[Measurement]) -> Option<BTreeMap<String, Vec<Seen<'_>>>> {
     let enough = of_target.len() > 1 && of_target.values().all(|rows| rows.len() >= FEWEST_OF_OTHER);
     enough.then_some(of_target)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::synthetic;
+
+    #[test]
+    fn rows_of_places_that_are_known_are_counted_by_target() {
+        let places =
+            [("mark", Vector3::zeros()), ("a", Vector3::new(60.0, 0.0, 20.0)), ("b", Vector3::new(0.0, -50.0, 9.0))];
+        let world = synthetic::planned(20, 0, 25.0, 0.0, 3, &|_| {});
+        let mut rows = synthetic::of_targets(&world, &places, 0.0, 3);
+        // One target a pose, the second at one in four only.
+        let shown = |pose: usize| if pose % 4 == 0 { "b" } else { ["mark", "a"][pose % 2] };
+        let mut index = 0..;
+        rows.retain(|row| index.next().is_some_and(|k: usize| row.target == shown(k / places.len())));
+        let known = places.iter().map(|(name, place)| ((*name).to_owned(), *place)).collect();
+        let (of_body, targets) = of_places(&rows, &known).unwrap();
+        let counts: Vec<(&str, usize)> = targets.parts.iter().map(|(name, part)| (name.as_str(), part.poses)).collect();
+        assert_eq!(counts, [("a", 12), ("b", 6)]);
+        assert_eq!(of_body.iter().filter(|row| row.target.is_empty()).count(), rows.len() - 18);
+        assert!(of_places(&rows, &BTreeMap::from([("a".to_owned(), Vector3::x())])).is_none());
+    }
+}

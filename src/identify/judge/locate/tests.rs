@@ -105,3 +105,20 @@ fn what_a_later_placement_leaves_open_is_named() {
     let refused = locate(&Dataset::new(&all).unwrap(), &truth, EXACT, &Settings::default()).unwrap_err();
     assert!(refused.to_string().contains("the cameras' turn about"), "{refused}");
 }
+
+/// A scatter that three points alone had to tell is known by three numbers, and intervals of 95 % are Student's.
+#[test]
+fn covariances_grow_by_what_the_scatter_of_few_poses_leaves_open() {
+    let (truth, mut rows) = rows(3, 0.05, false, 8);
+    synthetic::state(&mut rows, |_| None);
+    let set = Dataset::new(&rows).unwrap();
+    let placed = |point_mm: f64| {
+        let trust = Trust { point_mm, rotation_rad: None };
+        locate(&set, &truth, trust, &Settings::default()).unwrap().placed
+    };
+    let told = placed(1e-6);
+    // The same scatter, but as one that is known.
+    let known = placed((told.fresh_mm2 / 3.0).sqrt() * (1.0 + 1e-9));
+    let grown = told.sensor_from_base(0).covariance.trace() / known.sensor_from_base(0).covariance.trace();
+    assert!((grown - (3.182f64 / 1.960).powi(2)).abs() < 0.01, "{grown}");
+}

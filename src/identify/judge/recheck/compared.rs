@@ -169,3 +169,38 @@ impl Look {
         pseudo_inverse(normal) * pull
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::data::dataset::Reading;
+    use crate::identify::data::targets::Targets;
+    use crate::identify::synthetic;
+
+    /// A place that is a millimetre off moves the points of its own target by a millimetre, as the flange is turned there.
+    #[test]
+    fn places_of_targets_that_the_robot_joined_move_their_own_points() {
+        let world = synthetic::planned(40, 0, 25.0, 0.0, 3, &|_| {});
+        let mut set = Dataset::new(&world.rows).unwrap();
+        let parts = [Vector3::new(60.0, 0.0, 20.0), Vector3::new(-20.0, -55.0, 40.0)];
+        // A third of the poses shows the mark point.
+        let part = |row: usize| parts.get(row % 3).copied();
+        for (row, pose) in set.poses.iter_mut().enumerate() {
+            let shown = Point3::from(world.truth.tool_mm + part(row).unwrap_or_default());
+            let at = synthetic::sensor(pose.group) * world.truth.base_from_flange(&pose.joints_rad) * shown;
+            pose.on_body_mm = part(row);
+            pose.reading = Reading::Position { point_mm: at, covariance_mm2: None, rotation_rad: None };
+        }
+        assert!(places(&set, &world.truth).iter().all(|columns| columns.ncols() == 0));
+        set.targets = Some(Targets { place_sigma_mm: Some(0.0), ..Targets::default() });
+        for (row, (columns, pose)) in places(&set, &world.truth).iter().zip(&set.poses).enumerate() {
+            let flange = synthetic::sensor(pose.group) * world.truth.base_from_flange(&pose.joints_rad);
+            let mut expected = Matrix3xX::zeros(3 * parts.len());
+            if let Some(own) = part(row).and_then(|place| parts.iter().position(|p| *p == place)) {
+                expected.fixed_columns_mut::<3>(3 * own).copy_from(&rotation_matrix(&flange));
+            }
+            assert_eq!(columns.shape(), expected.shape());
+            assert!((columns - expected).norm() < 1e-6, "{columns}");
+        }
+    }
+}

@@ -116,3 +116,28 @@ impl<'a> Looks<'a> {
         Some((left, look.difference, total.iter().copied().collect()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+
+    /// Whether twelve residuals that are known to `sigma` show anything of a cause that adds its amount to each.
+    fn is_seen(unit: &'static str, sigma: f64) -> bool {
+        let joint = DMatrix::identity(12, 12) * sigma * sigma;
+        let difference = Difference::new(DVector::zeros(12), &joint, 60, 1.0).unwrap();
+        let look = Look { difference, columns: DMatrix::from_element(12, 1, 1.0) };
+        let suspects =
+            [Suspect { word: String::new(), words: String::new(), unit, columns: vec![(0, 1.0)], variance: 1.0 }];
+        Looks { look, again: &|_| None, suspects: &suspects }.is_seen(&suspects[0])
+    }
+
+    /// Columns hold for small turns only; a shift is linear however large it must be to be seen.
+    #[test]
+    fn a_turn_that_only_shows_when_it_is_large_is_not_seen_and_such_a_shift_is() {
+        let [deg, mm] = [Unit::Deg.flag(), Unit::Mm.flag()];
+        assert_eq!([0.1, 1.0, 10.0, 100.0].map(|sigma| is_seen(deg, sigma)), [true, true, false, false]);
+        assert_eq!([0.1, 1.0, 10.0, 100.0].map(|sigma| is_seen(mm, sigma)), [true; 4]);
+    }
+}

@@ -210,3 +210,68 @@ impl Rule {
 fn adaptive_inertia(cost: f64, least: f64, mean: f64, [low, high]: [f64; 2]) -> f64 {
     if cost <= mean && mean > least { low + (high - low) * (cost - least) / (mean - least) } else { high }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// A round bowl whose bottom is not at zero cost, off the middle of its box.
+    struct Bowl {
+        lower: Vec<f64>,
+        upper: Vec<f64>,
+    }
+
+    const BOWL_DIMENSION: usize = 4;
+
+    fn bowl() -> Bowl {
+        Bowl { lower: vec![-1.0; BOWL_DIMENSION], upper: vec![1.0; BOWL_DIMENSION] }
+    }
+
+    impl Problem for Bowl {
+        fn lower(&self) -> &[f64] {
+            &self.lower
+        }
+
+        fn upper(&self) -> &[f64] {
+            &self.upper
+        }
+
+        fn residuals(&self, x: &[f64]) -> DVector<f64> {
+            DVector::from_iterator(x.len() + 1, x.iter().map(|x| x - 0.2).chain([1.0]))
+        }
+
+        fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {
+            (self.residuals(x), DMatrix::identity(x.len() + 1, x.len()))
+        }
+    }
+
+    /// Clerc and Kennedy give 0.7298 for phi = 4.1; another factor still finds minima, but is not theirs.
+    #[test]
+    fn the_constriction_is_the_published_one() {
+        let rule = Rule::constricted(SwarmSettings::default().cpso_c);
+        assert!((rule.inertia - 0.7298).abs() < 5e-5, "{}", rule.inertia);
+        assert!((rule.own - 2.05 * 0.7298).abs() < 1e-4 && rule.own == rule.swarm);
+    }
+
+    #[test]
+    fn inertia_grows_with_the_cost_up_to_the_mean_and_is_full_beyond() {
+        let inertia = |cost: f64| adaptive_inertia(cost, 1.0, 3.0, [0.4, 0.9]);
+        assert_eq!([1.0, 2.0, 3.0].map(inertia), [0.4, 0.65, 0.9]);
+        assert_eq!([3.5, 100.0].map(inertia), [0.9, 0.9]);
+        // Particles that all cost the same have no spread to divide by.
+        assert_eq!(adaptive_inertia(2.0, 2.0, 2.0, [0.4, 0.9]), 0.9);
+    }
+
+    /// The stop is by what the cost fell by, and not by its share: the bottom of the bowl is not at zero.
+    #[test]
+    fn a_swarm_stops_as_soon_as_its_patience_gained_too_little() {
+        let (bowl, settings) = (bowl(), SwarmSettings { patience: 10, ..SwarmSettings::default() });
+        let found = Swarm::random(&bowl, &settings, 3).run(|swarm, _| swarm.advance(Method::Cpso));
+        assert!(found.stop == Stop::Stagnation && found.iterations < settings.iterations, "{:?}", found.stop);
+        let gains: Vec<f64> =
+            found.history.windows(settings.patience + 1).map(|w| w[0] - w[settings.patience]).collect();
+        let (last, before) = gains.split_last().unwrap();
+        assert!(*last < settings.improvement_mm2 && before.iter().all(|gain| *gain >= settings.improvement_mm2));
+    }
+}
