@@ -208,7 +208,9 @@ impl Explain for Error {
             }
             // The board is the right one: most pairs show it.
             Error::TooFewPairs { found, total, needed, .. } if *found > 0 && 2 * found >= *total => {
-                Some(format!("photograph the board in more places: {needed} pairs are the least, twelve make a sure rig"))
+                // Where a rig or its lenses are known, a few pairs do.
+                let sure = if *needed < 4 { "" } else { ", twelve make a sure rig" };
+                Some(format!("photograph the board in more places: {needed} pairs are the least{sure}"))
             }
             Error::TooFewPairs { board, .. } if board.is_coded() => {
                 let named = match board.kind {

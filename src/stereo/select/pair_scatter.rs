@@ -93,9 +93,9 @@ impl Jackknife<'_> {
         let moved = pair_motion::covariance(self.equations, self.layout, &own, inflation);
         let by_motion = moved.map_or(DMatrix::zeros(n, n), |moved| &inverse_root * moved * inverse_root.transpose());
         // What is expected counts by the factor beside the corners, so that it is known as much worse than the equations say.
-        let expected =
-            root.transpose() * &self.equations.prior.matrix * &root * ((self.lenses - self.least) / inflation);
-        let floor = DMatrix::identity(n, n) * self.least + expected + &by_motion;
+        let more = (self.lenses - self.least) / inflation;
+        let by_lenses = root.transpose() * &self.equations.prior.matrix * &root * more;
+        let floor = DMatrix::identity(n, n) * self.least + by_lenses + &by_motion;
         let shrunk = shrunk(&scatter, &steps, DMatrix::identity(n, n) + by_motion) / stretch;
         let (floor_root, floor_inverse) = roots(&floor)?;
         let eigen = (&floor_inverse * shrunk * floor_inverse.transpose()).symmetric_eigen();
