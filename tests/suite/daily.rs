@@ -202,7 +202,7 @@ fn a_check_says_what_it_judged_and_by_what() {
     let said = check(&[&all[..], &["--check-images", "check"]].concat());
     assert!(said.contains("second board: 8 pairs, largest error 0.0") && !said.contains("with a ruler"), "{said}");
     // A board that is known no better than that is what has to be measured, not the pictures.
-    let said = check(&[&all[..], &["--board-uncertainty-mm", "0.2"]].concat());
+    let said = check(&[&all[..], &["--board-uncertainty-mm", "1.5"]].concat());
     assert!(said.contains("next: measure the board's own lengths more finely"), "{said}");
     // Five pairs are too few poses, and that has a plain name.
     let said = check(&["--corners", "five.csv"]);
