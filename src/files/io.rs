@@ -144,8 +144,17 @@ pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -
     let files = path.read_dir_utf8().into_iter().flatten().flatten().filter(|entry| {
         entry.path().is_file() && entry.path().extension().is_some_and(|ending| READ.contains(&ending))
     });
-    let mut names: Vec<String> = files.map(|entry| format!("`{}`", entry.path())).collect();
+    // First the files of the kind that is most likely meant.
+    let likely: &[&str] = match what {
+        "robot file" => &["toml", "urdf"],
+        _ if what.contains("calibration") => &["json", "yaml", "yml"],
+        _ => &["csv", "xlsx"],
+    };
+    let rank = |path: &Utf8Path| likely.iter().position(|e| path.extension() == Some(*e)).unwrap_or(likely.len());
+    let mut names: Vec<(usize, String)> =
+        files.map(|entry| (rank(entry.path()), format!("`{}`", entry.path()))).collect();
     names.sort();
+    let mut names: Vec<String> = names.into_iter().map(|(_, name)| name).collect();
     let others = names.len().saturating_sub(NAMED);
     names.truncate(NAMED);
     let hint = match (names.is_empty(), others) {
@@ -312,7 +321,13 @@ mod tests {
             std::fs::write(path.join(format!("pose_{pose}.txt")), "").unwrap();
         }
         let hint = said().hint().unwrap();
-        assert!(hint.contains("pose_3.txt` and 3 more; ") && hint.ends_with("one table first, a row a pose"), "{hint}");
+        assert!(hint.contains("pose_2.txt` and 3 more; ") && hint.ends_with("one table first, a row a pose"), "{hint}");
+        // Of each kind that it may be, that one first.
+        std::fs::write(path.join("table.csv"), "").unwrap();
+        let of_table = read_text(path, "measurements file", None).unwrap_err().hint().unwrap();
+        assert!(of_table.starts_with(&format!("name a file in it: `{path}/table.csv`")), "{of_table}");
+        let hint = said().hint().unwrap();
+        assert!(hint.starts_with(&format!("name a file in it: `{path}/robot.toml`")), "{hint}");
     }
 
     #[test]

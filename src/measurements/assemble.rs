@@ -144,7 +144,7 @@ impl Taken<'_> {
         &self.parts[at.part].rows[row].1[at.column]
     }
 
-    /// Columns of the contract's own names.
+    /// Columns of the contract's own names; a group that no row has is none.
     fn own(&self) -> BTreeMap<&'static str, At> {
         let mut list = BTreeMap::new();
         for (part, meanings) in self.parts.iter().enumerate().filter_map(|(i, p)| Some((i, p.meanings.as_ref()?))) {
@@ -158,6 +158,7 @@ impl Taken<'_> {
         if let Some(at) = joined {
             list.entry("pose").or_insert(at);
         }
+        list.retain(|name, at| *name != "group" || (0..self.count()).any(|row| !self.cell(row, *at).is_empty()));
         list
     }
 
@@ -168,10 +169,13 @@ impl Taken<'_> {
         if let Some(k) = repeated {
             let _ = write!(pose, ".{k}");
         }
-        let mut group = given("group").unwrap_or_else(|| "1".to_owned());
+        // A row without a group where others have one is refused when the rows are read.
+        let of_column = own.get("group").map(|at| self.cell(row, *at).to_owned());
+        let mut group = of_column.clone().unwrap_or_else(|| "1".to_owned());
         if let Some(number) = self.number {
             pose = format!("{number}:{pose}");
-            group = match given("group") {
+            group = match of_column {
+                Some(group) if group.is_empty() => group,
                 Some(group) => format!("{number}:{group}"),
                 None => number.to_string(),
             };

@@ -2,6 +2,7 @@
 
 mod apart;
 mod assemble;
+mod blanks;
 mod copies;
 mod given;
 mod judge;
@@ -11,6 +12,7 @@ mod part;
 mod pick;
 mod rows;
 pub mod source;
+mod stuck;
 mod unsettled;
 
 pub use crate::csv_table::quoted;

@@ -132,7 +132,8 @@ impl Table<'_> {
 
     /// The robot's poses, one a row. With a column `target`, rows of several targets may be of one pose.
     fn poses(&self, target: Option<usize>) -> Result<Vec<RobotPose>> {
-        let (pose, group, role) = (self.column("pose"), self.column("group"), self.column("role"));
+        let (pose, role) = (self.column("pose"), self.column("role"));
+        let group = self.group_column()?;
         let numbers: Vec<String> =
             (1..=if pose.is_none() { self.rows.len() } else { 0 }).map(|n| n.to_string()).collect();
         let (joints, slides) = self.joint_columns()?;
@@ -202,8 +203,15 @@ pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
 /// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of
 /// its targets.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
+    read_whole(path).map(|(rows, _)| rows)
+}
+
+/// The same with a sentence on rows below the table, such as a mean.
+pub(super) fn read_whole(path: &Utf8Path) -> Result<(Vec<Measurement>, Option<String>)> {
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
-    from_table(&Table::read(path, "measurements file", hint)?)
+    let mut table = Table::read(path, "measurements file", hint)?;
+    let below = table.without_rows_below()?;
+    Ok((from_table(&table)?, below))
 }
 
 /// Measurements from a table.

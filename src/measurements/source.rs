@@ -8,6 +8,7 @@
 use camino::Utf8PathBuf;
 use serde::Deserialize;
 
+use super::Measurement;
 use super::apart;
 use super::assemble::{self, Taken};
 use super::copies;
@@ -16,8 +17,9 @@ use super::keys;
 use super::layout;
 use super::part::{At, Kind, Part};
 use super::pick::{self, Picked, listed};
+use super::rows::read_whole;
+use super::stuck;
 use super::unsettled;
-use super::{Measurement, read};
 use crate::diagnostic::Place;
 use crate::files::{Error, Result};
 use crate::robot::Robot;
@@ -94,7 +96,8 @@ impl Source {
                 && self.units.is_none()
                 && is_own(&Part::read(only, count, false)?)
             {
-                return Ok(copies::counted_once(read(only)?));
+                let (rows, below) = read_whole(only)?;
+                return Ok(checked(rows, below.into_iter().collect(), robot));
             }
             parts.push(Part::read(file, count, self.columns.is_some())?);
         }
@@ -120,9 +123,7 @@ impl Source {
                 );
             }
         }
-        let (rows, copied) = copies::counted_once(rows);
-        said.extend(copied);
-        Ok((rows, said))
+        Ok(checked(rows, said, robot))
     }
 
     /// The readings of the first file alone, whatever else stands beside them: line, name and readings in deg (mm); and what was taken.
@@ -238,6 +239,13 @@ impl Source {
             _ => None,
         }
     }
+}
+
+/// Rows that are copies, or hold no reading, are none; with what is said besides.
+fn checked(rows: Vec<Measurement>, mut said: Vec<String>, robot: &Robot) -> (Vec<Measurement>, Vec<String>) {
+    let (rows, copied) = copies::counted_once(rows);
+    said.extend(copied);
+    (copies::verifying_nothing(stuck::taken_away(rows, robot)), said)
 }
 
 /// Whether a file has the contract's own columns, poses with names, groups and roles.

@@ -46,6 +46,9 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
     recheck.of_strays().map_or(of_rest.clone(), |strays| format!("{strays}; without: {of_rest}"))
 }
 
+/// No single cause moves the target so far, mm, on an arm that still is that arm: it is another one.
+const ANOTHER_ARM_MM: f64 = 50.0;
+
 fn next(judged: Judged, recheck: &Recheck) -> &'static str {
     match judged.standing {
         Standing::StillValid if judged.advised_against => {
@@ -69,6 +72,9 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
         _ if !recheck.changed => "`stereocal locate` finds the instrument's placement anew; the robot stays",
         Standing::ChangedWithin => {
             "targets are within the tolerance still; look at what is named, and identify anew before it grows"
+        }
+        Standing::Changed if recheck.likeliest.is_empty() && recheck.effect_mm > ANOTHER_ARM_MM => {
+            "look first whether the file is of the arm that was measured: no arm changes so much by itself; then identify anew"
         }
         Standing::Changed if recheck.by_cameras => {
             "look for what happened to arm, tool and cameras since, then identify anew"

@@ -46,3 +46,4 @@ mod real;
 mod rectify;
 mod report;
 mod rows;
+mod unread;

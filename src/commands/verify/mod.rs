@@ -19,7 +19,7 @@ use crate::formats::robots::known;
 use crate::identify;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::known as distances;
-use crate::identify::data::{still, targets};
+use crate::identify::data::{still, targets, unused};
 use crate::identify::examine::{self, Examined, on_rows};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::judge::{folds, strays};
@@ -122,6 +122,7 @@ fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::
 
 /// What the user must know of the rows.
 fn tell(set: &Dataset, folded: bool, only_verify: bool) {
+    unused::unused(set).iter().for_each(|finding| progress::warn(finding.sentence()));
     if let Some(targets) = &set.targets {
         progress::note(targets.sentence());
     }

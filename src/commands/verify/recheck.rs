@@ -52,8 +52,8 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let record = against.with_file_name("identification.json");
     let made_by = out.provenance();
     let whole = made_by.as_ref().and_then(|run| run.shares(&record)).filter(|_| own.rows == 0);
-    let said =
-        |same| format!("this robot was identified from {same}: only new poses tell whether it still is that robot");
+    let how = if own.rows > 0 && own.fitted == 0 { "judged when it was identified by" } else { "identified from" };
+    let said = |same| format!("this robot was {how} {same}: only new poses tell whether it still is that robot");
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let advice = check.as_ref().and_then(|check| check.warning(against));
@@ -136,6 +136,8 @@ struct Own {
     /// How many, of how many with a reading.
     rows: usize,
     of: usize,
+    /// How many of them may have been fitted; the others were to verify it.
+    fitted: usize,
     /// Whether the others are too few to judge by: then all rows are kept.
     all: bool,
 }
@@ -146,16 +148,17 @@ impl Own {
         let given = known::given(against);
         let read = |row: &&Measurement| !matches!(row.observed, Observed::Missing { .. });
         let (of, own) = (rows.iter().filter(read).count(), rows.iter().filter(|row| given.holds(row)).count());
+        let fitted = rows.iter().filter(|row| given.fitted(row)).count();
         let others: Vec<Measurement> = rows.iter().filter(|row| !given.holds(row)).cloned().collect();
         let enough = of_targets(&others, against).is_ok_and(|set| set.placing_rows(FEWEST_POSES + 1).is_ok());
         if own > 0 && enough {
             *rows = others;
         }
-        Own { rows: own, of, all: own > 0 && !enough }
+        Own { rows: own, of, fitted, all: own > 0 && !enough }
     }
 
     fn statement(&self) -> Option<String> {
-        let Own { rows, of, all } = self;
+        let Own { rows, of, all, .. } = self;
         let left_out = if *all { "" } else { ", which are left out" };
         (*rows > 0).then(|| format!("{rows} of these {}{left_out}", count(*of, "row")))
     }

@@ -10,7 +10,7 @@ use crate::files;
 const NAMED: usize = 8;
 
 /// Standard deviation of a distance that comes without one, mm: a caliper's.
-const SIGMA_MM: f64 = 0.05;
+pub const SIGMA_MM: f64 = 0.05;
 
 /// Reads the distances between groups of `set`.
 pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>> {

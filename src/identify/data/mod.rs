@@ -6,3 +6,4 @@ pub mod repeats;
 pub mod shared;
 pub mod still;
 pub mod targets;
+pub mod unused;

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::hypothesis::{Hypothesis, hypotheses, still};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::examine::sessions;
+use crate::identify::examine::{known, sessions};
 use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
@@ -96,8 +96,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         }
         // Most faults bring the file's robot nearer to the readings; the others cost a fit each.
         // Lengths have one unit.
-        let open: Vec<Hypothesis> =
-            hypotheses(&set).into_iter().filter(|h| !(in_other_units && h.factor() != 1.0)).collect();
+        let open: Vec<Hypothesis> = hypotheses(&set)
+            .into_iter()
+            .filter(|h| !(in_other_units && h.factor() != 1.0) && suits(*h, &set, &robot))
+            .collect();
         let mut tried = explaining(&open, &set, &robot, settings, &now, true);
         let unexplained = tried.is_empty() && now.fitted >= IMPLAUSIBLE_MM;
         cut = if unexplained { in_sessions(&set, &robot, settings) } else { None };
@@ -133,6 +135,12 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
     Mended { set, robot, findings, against, unexplained_mm }
+}
+
+/// Whether the nominal robot does not speak against it: a unit explains all known distances, and not a mistyped one.
+fn suits(hypothesis: Hypothesis, set: &Dataset, robot: &Robot) -> bool {
+    let Hypothesis::KnownLengths(unit_mm, _) = hypothesis else { return true };
+    known::are_of_unit(set, robot, unit_mm)
 }
 
 /// What was done about a hypothesis, and what is to be mended, of it or of what is not told apart from it.

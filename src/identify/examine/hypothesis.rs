@@ -3,6 +3,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
+use crate::identify::data::known::SIGMA_MM;
 use crate::robot::Robot;
 use crate::tables::names::Unit;
 
@@ -189,7 +190,8 @@ impl Hypothesis {
             Hypothesis::KnownLengths(factor, _) => {
                 for known in &mut set.known {
                     known.distance_mm *= factor;
-                    known.sigma_mm *= factor;
+                    // What a caliper is taken to be certain to was not typed, and has no other unit.
+                    known.sigma_mm *= if known.sigma_mm == SIGMA_MM { 1.0 } else { factor };
                 }
             }
             Hypothesis::JointRadians(i) => in_degrees(&mut set, i),

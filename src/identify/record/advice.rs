@@ -10,6 +10,7 @@ use super::quality::PointSpread;
 use super::rounded;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::still::constant_joints;
+use crate::identify::data::unused;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
 use crate::identify::judge::locate::REPEATABILITY_MM;
@@ -20,7 +21,7 @@ use crate::robot::{Advice, Robot};
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
 /// Error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
-const IMPLAUSIBLE_MM: f64 = 20.0;
+pub(super) const IMPLAUSIBLE_MM: f64 = 20.0;
 
 impl Record {
     /// The reason with what to do about it, as the warnings have it.
@@ -43,6 +44,8 @@ impl Record {
         rows: Against,
     ) {
         let worse = self.worse(rows);
+        // What speaks against the rows is why they are far off.
+        let far = self.far_off(set, found).filter(|_| findings.against.is_empty());
         let kept = found.formulation().is_none().then(|| self.kept_nominal(found));
         let sentences = |list: &[Finding]| list.iter().map(Finding::sentence).collect::<Vec<_>>();
         // Points that nobody measured say nothing of a robot, whatever else is odd about them.
@@ -51,24 +54,24 @@ impl Record {
         let mut doubts: Vec<String> = computed.iter().cloned().chain(sentences(&findings.doubts)).collect();
         doubts.extend(self.implausible(set, nominal));
         // What speaks against the result is why its figures are odd, whatever the number of rows.
-        doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty()));
+        doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty() && far.is_none()));
         doubts.extend(still(set));
         doubts.extend(one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));
-        let against = findings.against.first().map(|finding| finding.finding.clone());
+        let against = findings.against.first().or(far.as_ref()).map(|finding| finding.finding.clone());
         (self.advice, self.reason) = match (against.or(worse.clone()), &kept, doubts.first()) {
             (Some(reason), ..) => (Advice::DoNotUse, reason),
             (None, Some(reason), _) => (Advice::KeepNominal, computed.as_ref().unwrap_or(reason).clone()),
             (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
             (None, None, None) => (Advice::Use, String::new()),
         };
-        self.warnings = sentences(&findings.against);
+        self.warnings = findings.against.iter().chain(&far).map(Finding::sentence).collect();
         self.warnings.extend(worse);
         self.warnings.extend(kept.filter(|_| self.advice != Advice::DoNotUse));
         self.warnings.extend(doubts);
         self.warnings.extend(sentences(&findings.notes));
         self.warnings.extend(self.zero_of_readings(found));
-        self.warnings.extend(self.unusable_rows());
+        self.warnings.extend(sentences(&unused::unused(set)));
         self.warnings.extend(self.undetermined());
     }
 
@@ -175,13 +178,6 @@ impl Record {
                  {zero_mm:.2} mm only; measure at distances that differ, or set `wire_offset = false` where the offset is zero"
             )
         })
-    }
-
-    fn unusable_rows(&self) -> Option<String> {
-        let first = self.skipped.first()?;
-        let count = self.skipped.len();
-        let rows = if count == 1 { "1 row has".to_owned() } else { format!("{count} rows have") };
-        Some(format!("{rows} no usable reading, first {} ({})", first.pose, first.reason))
     }
 
     /// What the poses do not determine.

@@ -1,6 +1,7 @@
 //! `identification.json`: what was found, in numbers for other programs, and whether to use it.
 
 mod advice;
+mod far;
 mod file;
 pub mod findings;
 mod gather;
