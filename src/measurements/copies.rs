@@ -112,7 +112,7 @@ mod tests {
     }
 
     fn point(k: usize, off_mm: f64) -> Observed {
-        let point_mm = Point3::new(1000.123_4 + 50.0 * k as f64 + off_mm, 20.0, 30.0);
+        let point_mm = Point3::new(1000.1234 + 50.0 * k as f64 + off_mm, 20.0, 30.0);
         Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None }
     }
 

@@ -93,7 +93,7 @@ mod tests {
             let at = RobotPose {
                 pose: format!("p{k}"),
                 group: format!("{}", k % 2),
-                role: if k % 5 == 0 { Role::Verify } else { Role::Sample },
+                role: if k.is_multiple_of(5) { Role::Verify } else { Role::Sample },
                 joints_deg,
                 slides: vec![],
             };

@@ -172,7 +172,7 @@ mod tests {
         let world = synthetic::planned(20, 0, 25.0, 0.0, 3, &|_| {});
         let mut rows = synthetic::of_targets(&world, &places, 0.0, 3);
         // One target a pose, the second at one in four only.
-        let shown = |pose: usize| if pose % 4 == 0 { "b" } else { ["mark", "a"][pose % 2] };
+        let shown = |pose: usize| if pose.is_multiple_of(4) { "b" } else { ["mark", "a"][pose % 2] };
         let mut index = 0..;
         rows.retain(|row| index.next().is_some_and(|k: usize| row.target == shown(k / places.len())));
         let known = places.iter().map(|(name, place)| ((*name).to_owned(), *place)).collect();
