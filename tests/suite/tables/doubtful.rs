@@ -27,9 +27,16 @@ fn readings_that_failed_change_no_choice() {
     ];
     for bad in kinds {
         let rows = of(bad);
+        // Several zeros are no readings; a single one is the fit's to find.
+        let zeros = rows.iter().filter(|(_, point)| *point == [0.0; 3]).count();
+        let read: Rows = rows.iter().filter(|(_, point)| zeros < 2 || *point != [0.0; 3]).cloned().collect();
+        let with_reading = |found: Vec<Measurement>| -> Vec<Measurement> {
+            found.into_iter().filter(|row| !matches!(row.observed, Observed::Missing { .. })).collect()
+        };
         let file = folder.file("bare.csv", bare(&rows));
         let (found, said) = source(&[&file]).read(&robot).expect("it is read");
-        same(&found, &rows, &said[0]);
+        assert_eq!(found.len(), rows.len());
+        same(&with_reading(found), &read, &said[0]);
         assert!(said[0].contains("confirms"), "{said:?}");
         // Radians and metres, which no name says.
         let small = text("q1 q2 q3 q4 q5 q6 x y z", &rows, " ", |q, p| {
@@ -37,7 +44,7 @@ fn readings_that_failed_change_no_choice() {
         });
         let file = folder.file("small.txt", small);
         let (found, said) = source(&[&file]).read(&robot).expect("it is read");
-        same(&found, &rows, &said[0]);
+        same(&with_reading(found), &read, &said[0]);
         assert!(said[0].contains("in radians") && said[0].contains("in m "), "{said:?}");
     }
 }
