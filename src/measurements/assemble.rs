@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use super::judge::{Basis, Way};
-use super::layout::{ONE_POINT, are_readings, is_kept};
-use super::part::{At, Kind, Part};
-use super::pick::{self, listed};
+use super::columns::judge::{Basis, Way};
+use super::columns::layout::{ONE_POINT, are_readings, is_kept};
+use super::columns::part::{At, Kind, Part};
+use super::columns::pick::{self, listed};
 use super::rows::{Measurement, from_table, reading_name};
 use crate::csv_table::Table;
 use crate::files::Result;

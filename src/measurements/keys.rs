@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::part::{Kind, Part};
+use super::columns::part::{Kind, Part};
 use crate::files::{Error, Result};
 use crate::tables::names::{What, words};
 

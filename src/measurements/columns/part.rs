@@ -10,7 +10,7 @@ use crate::tables::{Fields, Grid};
 
 /// A column of one of several files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct At {
+pub(in crate::measurements) struct At {
     pub part: usize,
     /// Its column, from 0.
     pub column: usize,
@@ -18,7 +18,7 @@ pub(super) struct At {
 
 /// What a column has in its cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(in crate::measurements) enum Kind {
     /// Numbers, some of them other than zero; empty cells allowed.
     Numbers,
     /// The row's number.
@@ -32,7 +32,7 @@ pub(super) enum Kind {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Part {
+pub(in crate::measurements) struct Part {
     /// Where it was read, and how.
     pub grid: Grid,
     /// Names as they stand.

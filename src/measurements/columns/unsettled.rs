@@ -8,7 +8,7 @@ use crate::tables::Form;
 use crate::tables::names::{Unit, What};
 
 /// That the files lack joints or what was measured.
-pub(super) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
+pub(in crate::measurements) fn lacking(parts: &[Part], picked: &Picked, count: usize) -> Error {
     let names = |p: &Part| {
         let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
         match shown {
@@ -78,7 +78,7 @@ fn contradicted(parts: &[Part], first: &Picked, forced: Forced) -> Option<Error>
 }
 
 /// That nothing comes near to the nominal robot in the units that were typed, and something does in others.
-pub(super) fn other_units(parts: &[Part], forced: Forced, way: &Way) -> Error {
+pub(in crate::measurements) fn other_units(parts: &[Part], forced: Forced, way: &Way) -> Error {
     let typed: Vec<&str> = forced.joints.iter().chain(&forced.lengths).map(|unit| unit.flag()).collect();
     let found = format!("{},{}", way.joints.flag(), way.lengths.flag());
     let message =
@@ -87,7 +87,7 @@ pub(super) fn other_units(parts: &[Part], forced: Forced, way: &Way) -> Error {
 }
 
 /// That no choice of columns comes near to the robot.
-pub(super) fn unplaced(parts: &[Part], picked: &Picked, forced: Forced) -> Error {
+pub(in crate::measurements) fn unplaced(parts: &[Part], picked: &Picked, forced: Forced) -> Error {
     if let Some(contradicted) = contradicted(parts, picked, forced) {
         return contradicted;
     }
@@ -121,7 +121,7 @@ pub fn is_not_near(error: &Error) -> bool {
 }
 
 /// That the rows of a pose are neither targets of one body nor readings of one point.
-pub(super) fn rows_of_pose(parts: &[Part]) -> Error {
+pub(in crate::measurements) fn rows_of_pose(parts: &[Part]) -> Error {
     let part = parts.iter().find(|part| part.times > 1).unwrap_or(&parts[0]);
     let message = format!(
         "{} has {} rows a pose, one after the other, and they are neither targets in one order, whose distances are kept, nor readings of one point",
@@ -134,7 +134,7 @@ pub(super) fn rows_of_pose(parts: &[Part]) -> Error {
 }
 
 /// That two ways would do, with the flags that take either.
-pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
+pub(in crate::measurements) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
     match (a.picked.points.first(), b.picked.points.first()) {
         (Some((_, first)), Some((_, second))) if first != second && a.picked.joints == b.picked.joints => {
             pick::asked(parts, &a.picked.joints, [first.min(second), first.max(second)], false)
@@ -150,7 +150,7 @@ pub(super) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
 }
 
 /// That a name states a unit in which the robot is far from the points.
-pub(super) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
+pub(in crate::measurements) fn wrong_unit(parts: &[Part], stated: &Way, better: &Way) -> Error {
     let (what, columns, said, found) = match stated.joints == better.joints {
         false => ("joints", better.picked.joints.clone(), stated.joints, better.joints),
         true => ("points", better.picked.first_point(), stated.lengths, better.lengths),

@@ -30,10 +30,10 @@ const ROWS: usize = 200;
 
 /// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a millimetre, rows are a hundred
 /// and more apart, and what was commanded differs from what was measured by tenths at the least.
-pub(super) const ONE_POINT: f64 = 1e-3;
+pub(in crate::measurements) const ONE_POINT: f64 = 1e-3;
 
 /// All ways to complete what the names say; columns of zeros are joints only where there is none without them.
-pub(super) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
+pub(in crate::measurements) fn candidates(parts: &[Part], picked: &Picked, count: usize) -> Vec<Picked> {
     let moving = of_columns(parts, picked, count, Part::free);
     let all = if moving.is_empty() { of_columns(parts, picked, count, Part::free_and_still) } else { moving };
     all.into_iter().map(|picked| picked.with_units(parts)).collect()
@@ -128,7 +128,7 @@ fn blocks(parts: &[Part], free: &[Vec<At>], count: usize, known: bool) -> Vec<Ve
 }
 
 /// Whether two points are at other distances from row to row.
-pub(super) fn changes_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+pub(in crate::measurements) fn changes_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
     let apart = distances(parts, a, b);
     apart.len() > 1 && !is_kept(apart)
 }
@@ -141,19 +141,19 @@ fn distances(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<f64> {
 }
 
 /// Whether these distances are one that is not zero, but for gross errors at less than half of the rows.
-pub(super) fn is_kept(apart: Vec<f64>) -> bool {
+pub(in crate::measurements) fn is_kept(apart: Vec<f64>) -> bool {
     let Some(middle) = median(apart.iter().copied()) else { return false };
     let off = median(apart.iter().map(|d| (d - middle).abs())).unwrap_or(f64::INFINITY);
     apart.len() > 1 && middle > 0.0 && off < RIGID * middle
 }
 
-pub(super) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
+pub(in crate::measurements) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
     let number = |at: &At| parts[at.part].optional(row, at.column).ok().flatten();
     Some(Point3::new(number(&at[0])?, number(&at[1])?, number(&at[2])?))
 }
 
 /// Whether what looks like several targets is one that was read several times.
-pub(super) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
+pub(in crate::measurements) fn are_readings(parts: &[Part], picked: &Picked) -> bool {
     let [(_, first), (_, second), ..] = &picked.points[..] else { return false };
     let rows = parts[first[0].part].rows.len().min(parts[second[0].part].rows.len());
     let at = |row: usize, columns: &[At; 3]| point(parts, row, columns);
@@ -169,7 +169,7 @@ mod tests {
     use nalgebra::Rotation3;
 
     use super::*;
-    use crate::measurements::pick;
+    use crate::measurements::columns::pick;
 
     /// A file of transforms, in which the rotations' entries are as many numbers side by side as a robot has joints.
     #[test]

@@ -21,7 +21,7 @@ use crate::tables::names::{Unit, What};
 /// metre's reach that is off by five hundredths of it is none that was built. Points that have nothing to do with the joints leave a share whose
 /// square is distributed as Beta(f / 2, 9 / 2), f = 3 n - 9 numbers of n rows being left beside placement and tool: less than this with a
 /// probability of 4e-7 for five rows, and with 1e-3 for four, which is too much where a thousand choices of columns are tried.
-pub(super) const NEAR: f64 = 0.05;
+pub(in crate::measurements) const NEAR: f64 = 0.05;
 
 /// Rows from which on chance does not come near.
 const FEWEST: usize = 5;
@@ -45,7 +45,7 @@ const ROWS: usize = 60;
 
 /// A way to read a table.
 #[derive(Debug, Clone)]
-pub(super) struct Way {
+pub(in crate::measurements) struct Way {
     pub picked: Picked,
     pub joints: Unit,
     /// Unit of points or distances.
@@ -73,7 +73,7 @@ impl Way {
     }
 
     /// The same of these rows, as a share of the spread of the points and in mm.
-    pub(super) fn left_of(&self, parts: &[Part], robot: &Robot, rows: &[usize]) -> Option<(f64, f64)> {
+    pub(in crate::measurements) fn left_of(&self, parts: &[Part], robot: &Robot, rows: &[usize]) -> Option<(f64, f64)> {
         let Way { picked, joints, lengths, .. } = self;
         let (_, at) = picked.points.first()?;
         let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
@@ -105,7 +105,7 @@ impl Way {
 
 /// How a way was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Basis {
+pub(in crate::measurements) enum Basis {
     /// Names or flags say it.
     Stated,
     /// The nominal robot does.
@@ -114,7 +114,7 @@ pub(super) enum Basis {
     Sizes,
 }
 
-pub(super) enum Verdict {
+pub(in crate::measurements) enum Verdict {
     /// This way.
     Taken(Way, Basis),
     /// A name states a unit that another one is much nearer than.
@@ -129,7 +129,7 @@ pub(super) enum Verdict {
 
 /// Units that flags state, which nothing doubts.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct Forced {
+pub(in crate::measurements) struct Forced {
     pub joints: Option<Unit>,
     pub lengths: Option<Unit>,
 }
@@ -154,7 +154,7 @@ fn in_all_units(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Fo
 }
 
 /// The candidates in the units that nobody need say, or in those that are stated, unjudged.
-pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
+pub(in crate::measurements) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
     let units = [(Unit::Deg, Unit::Mm), (Unit::Deg, Unit::M), (Unit::Rad, Unit::Mm), (Unit::Rad, Unit::M)];
     let way = |picked: &Picked, (joints, lengths): (Unit, Unit)| {
         let joints = forced.joints.or(picked.joint_unit).unwrap_or(joints);
@@ -164,7 +164,7 @@ pub(super) fn usual(candidates: &[Picked], forced: Forced) -> Vec<Way> {
 }
 
 /// Judges all ways.
-pub(super) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
+pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
     let guessed = |p: &Picked| p.columns().any(|at| unknown(&at));
     let free = |at: &At| !parts[at.part].is_named() || unknown(at);
@@ -278,7 +278,7 @@ fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
 }
 
 /// Degrees, where a joint is beyond a turn in radians.
-pub(super) fn angle_by_size(parts: &[Part], picked: &Picked) -> Option<Unit> {
+pub(in crate::measurements) fn angle_by_size(parts: &[Part], picked: &Picked) -> Option<Unit> {
     (largest(parts, &mut picked.joints.iter().copied()) > TAU).then_some(Unit::Deg)
 }
 

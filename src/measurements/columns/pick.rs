@@ -11,7 +11,7 @@ use crate::tables::names::{Name, Unit, What, is_index};
 
 /// Columns, taken so far.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Picked {
+pub(in crate::measurements) struct Picked {
     pub joints: Vec<At>,
     /// x, y and z of each target, with its name.
     pub points: Vec<(String, [At; 3])>,
@@ -52,13 +52,20 @@ impl Picked {
 }
 
 /// A joint's reading in deg, or in mm where it slides: in the unit that its column states, else in these.
-pub(super) fn reading(parts: &[Part], at: &At, joint: &Joint, value: f64, angles: Unit, lengths: Unit) -> f64 {
+pub(in crate::measurements) fn reading(
+    parts: &[Part],
+    at: &At,
+    joint: &Joint,
+    value: f64,
+    angles: Unit,
+    lengths: Unit,
+) -> f64 {
     let stated = unit(parts, at).filter(|u| !u.is_angle());
     if joint.slides { stated.unwrap_or(lengths).converted(value) } else { angles.converted(value) }
 }
 
 /// Columns of lengths are no joints that turn.
-pub(super) fn check_lengths(parts: &[Part], picked: &Picked, robot: &Robot) -> Result<()> {
+pub(in crate::measurements) fn check_lengths(parts: &[Part], picked: &Picked, robot: &Robot) -> Result<()> {
     for (number, (at, joint)) in picked.joints.iter().zip(&robot.joints).enumerate() {
         if unit(parts, at).is_some_and(|u| !u.is_angle()) && !joint.slides {
             let message = format!("{} is a length, but joint {} of the robot turns", listed(parts, &[*at]), number + 1);
@@ -105,7 +112,7 @@ fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group>
 }
 
 /// Takes what the names say; `count` is the robot's number of joints.
-pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
+pub(in crate::measurements) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
     let mut picked = Picked { joints: joints(parts, count)?, ..Picked::default() };
     let distance = groups(parts, |n| (n.what == What::Distance && n.measured != Some(false)).then_some(0));
     let points = points(parts)?;
@@ -142,12 +149,12 @@ pub(super) fn by_names(parts: &[Part], count: usize) -> Result<Picked> {
 }
 
 /// The joints alone, of a table that measured nothing.
-pub(super) fn joints_alone(parts: &[Part], count: usize) -> Result<Picked> {
+pub(in crate::measurements) fn joints_alone(parts: &[Part], count: usize) -> Result<Picked> {
     Ok(Picked { joints: joints(parts, count)?, ..Picked::default() }.with_units(parts))
 }
 
 /// Whether a file names as many joints as the robot has; a quaternion `Q0..Q3` is none.
-pub(super) fn names_joints(part: &Part, count: usize) -> bool {
+pub(in crate::measurements) fn names_joints(part: &Part, count: usize) -> bool {
     groups(std::slice::from_ref(part), joint_number).iter().any(|group| group.columns.len() == count)
 }
 
@@ -281,7 +288,7 @@ fn translations(parts: &[Part]) -> Vec<(Vec<String>, [At; 3], Option<bool>)> {
 }
 
 /// Columns as a sentence names them.
-pub(super) fn listed(parts: &[Part], columns: &[At]) -> String {
+pub(in crate::measurements) fn listed(parts: &[Part], columns: &[At]) -> String {
     let name = |at: &At| parts[at.part].column_name(at.column);
     let run = columns.windows(2).all(|two| two[0].part == two[1].part && two[0].column + 1 == two[1].column);
     match columns {
@@ -314,7 +321,12 @@ fn twice(parts: &[Part], what: &str, columns: &[At]) -> Error {
 
 /// That two sets of points would do, with the flags that take either, or both as readings of one point.
 /// Joints that are not given are those of the names.
-pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2], readings: bool) -> Error {
+pub(in crate::measurements) fn asked(
+    parts: &[Part],
+    joints: &[At],
+    [first, second]: [&[At; 3]; 2],
+    readings: bool,
+) -> Error {
     let message = format!(
         "two points would do, {} and {}: which was measured, and which was commanded or computed, only you know",
         listed(parts, first),
@@ -331,7 +343,12 @@ pub(super) fn asked(parts: &[Part], joints: &[At], [first, second]: [&[At; 3]; 2
 }
 
 /// What `--columns` must say to take these columns, and one `more` by its name; joints or points that names say are added.
-pub(super) fn columns_flag(parts: &[Part], joints: &[At], points: &[At], more: Option<(At, &str)>) -> String {
+pub(in crate::measurements) fn columns_flag(
+    parts: &[Part],
+    joints: &[At],
+    points: &[At],
+    more: Option<(At, &str)>,
+) -> String {
     let mut named: Vec<(usize, At)> =
         groups(parts, joint_number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
     named.sort_unstable();

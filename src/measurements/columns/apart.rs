@@ -29,7 +29,7 @@ const CLEAR: f64 = 4.0;
 const LEAST_MM: f64 = 3.0;
 
 /// A column that sets rows apart.
-pub(super) struct Apart {
+pub(in crate::measurements) struct Apart {
     at: At,
     values: Vec<String>,
     together_mm: f64,
@@ -39,7 +39,7 @@ pub(super) struct Apart {
 }
 
 /// The column that sets the rows apart most clearly, if one does, of all these ways to read a table.
-pub(super) fn clearest(parts: &[Part], ways: Vec<Way>, robot: &Robot) -> Option<Apart> {
+pub(in crate::measurements) fn clearest(parts: &[Part], ways: Vec<Way>, robot: &Robot) -> Option<Apart> {
     let found = ways.iter().take(MOST_WAYS).filter_map(|way| of_way(parts, way, robot));
     found.min_by(|a, b| a.apart_mm.total_cmp(&b.apart_mm))
 }

@@ -1,0 +1,10 @@
+//! Which columns of a table are the joints, which the measured points, and in what units.
+
+pub(super) mod apart;
+pub(super) mod judge;
+pub(super) mod layout;
+pub(super) mod part;
+pub(super) mod pick;
+pub(super) mod unsettled;
+
+pub use unsettled::is_not_near;
