@@ -12,8 +12,7 @@ use crate::robot::Check;
 /// Warns of what a robot's or a placement's own file says of its use; with which status a command that uses it ends at best.
 pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     check.and_then(|check| check.warning(file)).into_iter().for_each(progress::warn);
-    let changed =
-        file.file_name().zip(file.parent()).and_then(|(name, folder)| changed_since(folder, "verify.json", name));
+    let changed = changed_since(file, "verify.json");
     changed.iter().for_each(progress::warn);
     let advised = check.map_or(Status::Done, |check| check.advice.status());
     if changed.is_some() { Status::OutOfTolerance } else { advised }
@@ -29,19 +28,18 @@ pub struct RigDoubts {
 /// Warns of what a rig's own calibration says against it, and a check that was made of it since. What is made with a rig that did not pass states
 /// its own uncertainty, so that the status is not the rig's; of one that changed it states too little.
 pub fn heed_rig(rig: &Calibrated, file: &Utf8Path) -> RigDoubts {
-    let changed =
-        file.file_name().zip(file.parent()).and_then(|(name, folder)| changed_since(folder, "recheck.json", name));
+    let changed = changed_since(file, "recheck.json");
     let status = if changed.is_some() { Status::OutOfTolerance } else { Status::Done };
     let said: Vec<String> = changed.into_iter().chain(rig.doubts()).collect();
     said.iter().for_each(progress::warn);
     RigDoubts { said, status }
 }
 
-/// What the last check beside a result says against it, if it was of that very result.
-pub fn changed_since(folder: &Utf8Path, check: &str, result: &str) -> Option<String> {
-    let path = folder.join(check);
+/// What the last check beside a result's file says against it, if it was of that very result.
+pub fn changed_since(file: &Utf8Path, check: &str) -> Option<String> {
+    let (path, result) = (file.with_file_name(check), file.file_name()?);
     let checked: CheckedAgainst = serde_json::from_slice(&std::fs::read(&path).ok()?).ok()?;
-    let now = Digested::read(&folder.join(result))?.sha256;
+    let now = Digested::read(file)?.sha256;
     let is_of_it = Provenance::of_json(&path)?.inputs.iter().any(|input| input.sha256 == now);
     let changed = matches!(checked.standing, Standing::Changed | Standing::ChangedWithin);
     (is_of_it && changed).then(|| format!("{result} no longer holds by {path}: {}", checked.statement))

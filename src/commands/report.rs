@@ -41,8 +41,8 @@ fn read(path: &Utf8Path) -> Result<Option<Value>> {
 
 /// What a check of the rig or of the robot that was made since then says against it.
 fn changed(folder: &Utf8Path) -> Vec<String> {
-    let rig = changed_since(folder, "recheck.json", "calibration.json");
-    rig.into_iter().chain(changed_since(folder, "verify.json", "identified.toml")).collect()
+    let rig = changed_since(&folder.join("calibration.json"), "recheck.json");
+    rig.into_iter().chain(changed_since(&folder.join("identified.toml"), "verify.json")).collect()
 }
 
 /// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.

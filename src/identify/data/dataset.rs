@@ -137,7 +137,16 @@ pub struct KnownDistance {
     /// Index of the other.
     pub b: usize,
     pub distance_mm: f64,
-    pub sigma_mm: f64,
+    /// Its standard deviation, where it comes with one.
+    pub stated_sigma_mm: Option<f64>,
+}
+
+impl KnownDistance {
+    /// Its standard deviation; that of a caliper where none is stated, mm.
+    pub fn sigma_mm(&self) -> f64 {
+        const CALIPER_MM: f64 = 0.05;
+        self.stated_sigma_mm.unwrap_or(CALIPER_MM)
+    }
 }
 
 impl Dataset {

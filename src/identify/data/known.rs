@@ -9,9 +9,6 @@ use crate::files;
 /// Groups that a message names.
 const NAMED: usize = 8;
 
-/// Standard deviation of a distance that comes without one, mm: a caliper's.
-pub const SIGMA_MM: f64 = 0.05;
-
 /// Reads the distances between groups of `set`.
 pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>> {
     let hint = "a CSV with the columns group_a,group_b,distance_mm and optionally sigma_mm";
@@ -29,16 +26,14 @@ pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>>
             place.ok_or_else(|| table.refuse_with(*line, message(), Some(&groups)))
         };
         let distance_mm = table.number(*line, row, distance)?;
-        let sigma_mm = match sigma {
-            Some(column) if !row[column].is_empty() => table.number(*line, row, column)?,
-            _ => SIGMA_MM,
-        };
+        let given = sigma.filter(|column| !row[*column].is_empty());
+        let stated_sigma_mm = given.map(|column| table.number(*line, row, column)).transpose()?;
         let (a, b) = (group(a)?, group(b)?);
-        if distance_mm <= 0.0 || sigma_mm <= 0.0 || a == b {
+        if distance_mm <= 0.0 || stated_sigma_mm.is_some_and(|mm| mm <= 0.0) || a == b {
             let message = "a known distance lies between two different groups, and it and its sigma_mm are above zero";
             return Err(table.refuse(*line, message.to_owned()));
         }
-        list.push(KnownDistance { a, b, distance_mm, sigma_mm });
+        list.push(KnownDistance { a, b, distance_mm, stated_sigma_mm });
     }
     Ok(list)
 }

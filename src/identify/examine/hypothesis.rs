@@ -3,7 +3,6 @@
 use nalgebra::{Rotation3, Vector3};
 
 use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
-use crate::identify::data::known::SIGMA_MM;
 use crate::robot::Robot;
 use crate::tables::names::Unit;
 
@@ -190,8 +189,7 @@ impl Hypothesis {
             Hypothesis::KnownLengths(factor, _) => {
                 for known in &mut set.known {
                     known.distance_mm *= factor;
-                    // What a caliper is taken to be certain to was not typed, and has no other unit.
-                    known.sigma_mm *= if known.sigma_mm == SIGMA_MM { 1.0 } else { factor };
+                    known.stated_sigma_mm = known.stated_sigma_mm.map(|mm| mm * factor);
                 }
             }
             Hypothesis::JointRadians(i) => in_degrees(&mut set, i),

@@ -148,7 +148,7 @@ mod tests {
                 a: k,
                 b: k + 4,
                 distance_mm: (sockets[k] - sockets[k + 4]).norm(),
-                sigma_mm: 0.01,
+                stated_sigma_mm: Some(0.01),
             })
             .collect();
         set.known[1].distance_mm += off_mm;
@@ -184,7 +184,7 @@ mod tests {
             let mut set = Dataset::new(&world.rows).unwrap();
             let length = |a: usize, b: usize| (sockets[a] - sockets[b]).norm();
             set.known = [(0, 2, length(0, 4)), (1, 3, length(1, 5))]
-                .map(|(a, b, distance_mm)| KnownDistance { a, b, distance_mm, sigma_mm: 0.01 })
+                .map(|(a, b, distance_mm)| KnownDistance { a, b, distance_mm, stated_sigma_mm: Some(0.01) })
                 .to_vec();
             let (left, findings) = examine(&set, &world.nominal, &Settings::default());
             assert_eq!((left.known.len(), findings), (2, Vec::new()), "{by_deg}");
@@ -210,8 +210,12 @@ mod tests {
         let length = |k: usize| (sockets[k] - sockets[k + 4]).norm();
         let of = |factors: &[f64]| {
             let mut set = Dataset::new(&world.rows).unwrap();
-            let known =
-                |(k, f): (usize, &f64)| KnownDistance { a: k, b: k + 4, distance_mm: f * length(k), sigma_mm: 0.01 };
+            let known = |(k, f): (usize, &f64)| KnownDistance {
+                a: k,
+                b: k + 4,
+                distance_mm: f * length(k),
+                stated_sigma_mm: Some(0.01),
+            };
             set.known = factors.iter().enumerate().map(known).collect();
             set
         };

@@ -64,9 +64,9 @@ impl Touch {
         for (k, (_, known)) in self.known.iter().enumerate() {
             let row = 3 * self.contacts.len() + k;
             let (u, distance) = direction(&(sockets[known.b] - sockets[known.a]));
-            residuals[row] = (distance - known.distance_mm) / known.sigma_mm;
-            design.fixed_view_mut::<1, 3>(row, 3 * known.a).copy_from(&(-u.transpose() / known.sigma_mm));
-            design.fixed_view_mut::<1, 3>(row, 3 * known.b).copy_from(&(u.transpose() / known.sigma_mm));
+            residuals[row] = (distance - known.distance_mm) / known.sigma_mm();
+            design.fixed_view_mut::<1, 3>(row, 3 * known.a).copy_from(&(-u.transpose() / known.sigma_mm()));
+            design.fixed_view_mut::<1, 3>(row, 3 * known.b).copy_from(&(u.transpose() / known.sigma_mm()));
         }
         (residuals, design)
     }

@@ -87,7 +87,7 @@ impl World {
             .map(|k| {
                 let (a, b) = (k, k + SOCKETS / 2);
                 let distance_mm = (sockets[a] - sockets[b]).norm() + KNOWN_MM * normal(&mut random);
-                KnownDistance { a, b, distance_mm, sigma_mm: KNOWN_MM }
+                KnownDistance { a, b, distance_mm, stated_sigma_mm: Some(KNOWN_MM) }
             })
             .collect();
         World { nominal, truth, rows, known }
