@@ -65,8 +65,8 @@ pub(super) fn worst_table(set: &Dataset, before: &[RowError], after: &[RowError]
     let header = [named, "group", "distance before, mm", "after, mm", "point before, mm", "after, mm"];
     html! {
         p { "The worst after identification, predicted minus measured. "
-            @if set.groups.len() > 1 { "One group among them: the " (sensor(set.is_of_cameras())) " or its centre moved there. " }
-            "One region of the workspace among them: the model is not enough there." }
+            @if set.groups.len() > 1 { "Where all are of one group, the " (sensor(set.is_of_cameras())) " or its centre moved there. " }
+            "Where all are of one region of the workspace, the model lacks something there." }
         (page::table(&header, &rows))
     }
 }
