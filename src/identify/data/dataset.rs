@@ -141,14 +141,6 @@ pub struct KnownDistance {
     pub stated_sigma_mm: Option<f64>,
 }
 
-impl KnownDistance {
-    /// Its standard deviation; that of a caliper where none is stated, mm.
-    pub fn sigma_mm(&self) -> f64 {
-        const CALIPER_MM: f64 = 0.05;
-        self.stated_sigma_mm.unwrap_or(CALIPER_MM)
-    }
-}
-
 impl Dataset {
     /// Sorts the rows, several targets of a pose and repeated readings made one.
     pub fn new(rows: &[Measurement]) -> Result<Dataset, Error> {

@@ -9,6 +9,14 @@ use crate::files;
 /// Groups that a message names.
 const NAMED: usize = 8;
 
+impl KnownDistance {
+    /// Its standard deviation; that of a caliper where none is stated, mm.
+    pub fn sigma_mm(&self) -> f64 {
+        const CALIPER_MM: f64 = 0.05;
+        self.stated_sigma_mm.unwrap_or(CALIPER_MM)
+    }
+}
+
 /// Reads the distances between groups of `set`.
 pub fn read(path: &Utf8Path, set: &Dataset) -> files::Result<Vec<KnownDistance>> {
     let hint = "a CSV with the columns group_a,group_b,distance_mm and optionally sigma_mm";
