@@ -39,38 +39,60 @@ struct JointScrews {
     slides: bool,
 }
 
-/// What joints do at any reading, where nothing tilts them.
-pub struct Links(Vec<Link>);
-
-/// Alpha and beta, and sine and cosine of both.
-struct Link {
-    angles_rad: [f64; 2],
-    turns: [(f64, f64); 2],
+/// A joint's turn with its sine and cosine, from which those of turns near it follow without another call.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    rad: f64,
+    sine: f64,
+    cosine: f64,
 }
+
+impl Turn {
+    /// The same of a turn in rad.
+    pub fn new(rad: f64) -> Turn {
+        let (sine, cosine) = rad.sin_cos();
+        Turn { rad, sine, cosine }
+    }
+
+    /// Sine and cosine of another turn: of the difference by their series, which end below the last digit, where it is small.
+    fn sin_cos(&self, rad: f64) -> (f64, f64) {
+        let by = rad - self.rad;
+        if by.abs() > 0.1 {
+            return rad.sin_cos();
+        }
+        // The reciprocals are constants: a division costs as much as ten products.
+        let nested = |square: f64, [a, b, c]: [f64; 3]| 1.0 - square * a * (1.0 - square * b * (1.0 - square * c));
+        let square = by * by;
+        let sine = by * (1.0 - square * (1.0 / 6.0) * nested(square, [1.0 / 20.0, 1.0 / 42.0, 1.0 / 72.0]));
+        let fall = 0.5 * square * nested(square, [1.0 / 12.0, 1.0 / 30.0, 1.0 / 56.0]);
+        (self.sine + (self.cosine * sine - self.sine * fall), self.cosine - (self.sine * sine + self.cosine * fall))
+    }
+}
+
+/// Alpha and beta of the joints where nothing tilts them.
+pub struct Links(Vec<[Turn; 2]>);
 
 impl Links {
     pub fn new(joints: &[Joint]) -> Links {
-        let link = |joint: &Joint| {
-            let angles_rad = [joint.alpha_rad, joint.beta_rad];
-            Link { angles_rad, turns: angles_rad.map(f64::sin_cos) }
-        };
-        Links(joints.iter().map(link).collect())
+        Links(joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect())
     }
 
-    /// Goes along the chain; `see` gets every joint's screws. The flange's rotation and the target's point, base frame, mm.
+    /// Goes along the chain; `see` gets every joint's screws. The flange's rotation and the target's point, base frame, mm. `near` are turns
+    /// of the joints that theirs are near to, where such are known.
     #[inline]
     fn along(
         &self,
         bent: &Bent,
+        near: &[Turn],
         tool_mm: &Vector3<f64>,
         mut see: impl FnMut(JointScrews),
     ) -> (Matrix3<f64>, Point3<f64>) {
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();
-        for ((joint, &q), link) in bent.joints.iter().zip(&bent.joints_rad).zip(&self.0) {
-            let angles = [joint.alpha_rad, joint.beta_rad];
-            let [(sa, ca), (sb, cb)] = if angles == link.angles_rad { link.turns } else { angles.map(f64::sin_cos) };
-            let (st, ct) = joint.turn_rad(q).sin_cos();
+        for (i, ((joint, &q), [alpha, beta])) in bent.joints.iter().zip(&bent.joints_rad).zip(&self.0).enumerate() {
+            let ((sa, ca), (sb, cb)) = (alpha.sin_cos(joint.alpha_rad), beta.sin_cos(joint.beta_rad));
+            let turn_rad = joint.turn_rad(q);
+            let (st, ct) = near.get(i).map_or_else(|| turn_rad.sin_cos(), |near| near.sin_cos(turn_rad));
             let x: Vector3<f64> = rotation.column(0).into();
             let (y0, z0) = (rotation.column(1), rotation.column(2));
             let y: Vector3<f64> = ca * y0 + sa * z0;
@@ -87,21 +109,21 @@ impl Links {
     }
 
     /// The flange's rotation and the target's point, base frame, mm, of the robot as it stands.
-    pub fn end(&self, bent: &Bent, tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
-        self.along(bent, tool_mm, |_| {})
+    pub fn end(&self, bent: &Bent, near: &[Turn], tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
+        self.along(bent, near, tool_mm, |_| {})
     }
 }
 
 impl Screws {
     /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
     pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
-        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints))
+        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints), &[])
     }
 
-    /// The same with the links of the robot as it is before anything tilts it.
-    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links) -> Screws {
+    /// The same with the links of the robot as it is before anything tilts it, and turns that the joints' are near to.
+    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links, near: &[Turn]) -> Screws {
         let mut joints = Vec::with_capacity(bent.joints.len());
-        let (base_from_flange, target_mm) = links.along(bent, tool_mm, |joint| joints.push(joint));
+        let (base_from_flange, target_mm) = links.along(bent, near, tool_mm, |joint| joints.push(joint));
         Screws { joints, base_from_flange, target_mm }
     }
 
@@ -167,6 +189,17 @@ mod tests {
     /// Step of the central differences, mm or mrad; their error is its square times the third derivative (below 1e-3 mm).
     const STEP: f64 = 1e-2;
     const TOLERANCE_MM: f64 = 1e-6;
+
+    #[test]
+    fn a_turn_near_a_known_one_keeps_its_digits() {
+        for at in [-2.5_f64, 0.0, 0.4, 1.6, 3.1] {
+            for by in [0.0, 1e-9, -3e-4, 0.02, -0.0999, 0.11, 2.0] {
+                let ((sine, cosine), rad) = (Turn::new(at).sin_cos(at + by), at + by);
+                let off = (sine - rad.sin()).abs().max((cosine - rad.cos()).abs());
+                assert!(off < 4e-16, "{at} {by}: {off}");
+            }
+        }
+    }
 
     fn robots() -> Vec<Robot> {
         let mut bent = Robot::paper();

@@ -7,7 +7,7 @@
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 
 use crate::robot::bent::{Bent, Torques};
-use crate::robot::jacobian::{Feature, Links, Screws, feature};
+use crate::robot::jacobian::{Feature, Links, Screws, Turn, feature};
 use crate::robot::{Joint, Parameter, Robot};
 
 /// A robot at fixed commanded poses with chosen parameters free.
@@ -17,13 +17,31 @@ pub struct Kinematics {
     pub nominal: Robot,
     /// The free parameters.
     pub parameters: Vec<Parameter>,
+    /// Places among the parameters of those that act otherwise at each pose, and what they do there.
+    acts: Vec<(usize, Act)>,
     poses: Vec<PoseConstants>,
+}
+
+/// What a correction does at a pose, to which joint.
+#[derive(Debug, Clone, Copy)]
+enum Act {
+    Tilts(usize),
+    Turns(usize),
+}
+
+impl Act {
+    fn of(parameter: Parameter) -> Option<Act> {
+        let turns = || parameter.corrected_joint().map(Act::Turns);
+        parameter.tilted_joint().map(Act::Tilts).or_else(turns)
+    }
 }
 
 #[derive(Debug, Clone)]
 struct PoseConstants {
     /// Angles with the nominal robot's own corrections, rad.
     angles_rad: Vec<f64>,
+    /// The nominal robot's turns of its joints.
+    turns: Vec<Turn>,
     /// What the nominal robot's own bending and wobble add to alpha and beta, one a joint, rad; empty without.
     tilts_rad: Vec<[f64; 2]>,
     /// One a parameter.
@@ -60,14 +78,17 @@ impl Kinematics {
                 false => Vec::new(),
                 true => bent.joints.iter().zip(&nominal.joints).map(tilt).collect(),
             };
+            let turn = |(joint, &q): (&Joint, &f64)| Turn::new(joint.turn_rad(q));
             PoseConstants {
+                turns: nominal.joints.iter().zip(&bent.joints_rad).map(turn).collect(),
                 angles_rad: bent.joints_rad,
                 tilts_rad,
                 features: parameters.iter().map(|&p| feature(p, &torques, q)).collect(),
             }
         };
         let poses = joints_rad.iter().map(constants).collect();
-        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), poses }
+        let acts = parameters.iter().enumerate().filter_map(|(k, &p)| Act::of(p).map(|act| (k, act))).collect();
+        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, poses }
     }
 
     /// Every pose, with derivatives where asked.
@@ -80,7 +101,7 @@ impl Kinematics {
             if derivatives {
                 return self.with_columns(&robot, &links, pose, &bent);
             }
-            let (rotation, point_mm) = links.end(&bent, &robot.tool_mm);
+            let (rotation, point_mm) = links.end(&bent, &pose.turns, &robot.tool_mm);
             Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
         };
         self.poses.iter().map(place).collect()
@@ -93,19 +114,21 @@ impl Kinematics {
         for (joint, tilt) in pose.tilts_rad.iter().enumerate() {
             bent.tilt(joint, *tilt);
         }
-        for ((&parameter, &offset), &feature) in self.parameters.iter().zip(offsets).zip(&pose.features) {
-            if let Some(joint) = parameter.tilted_joint() {
-                bent.tilt(joint, feature.map(|f| offset / 1000.0 * f));
-            } else if let Some(joint) = parameter.corrected_joint()
-                && let Some(angle) = bent.joints_rad.get_mut(joint)
-            {
-                *angle += offset / 1000.0 * feature[0];
+        for &(k, act) in &self.acts {
+            let (offset, feature) = (offsets[k] / 1000.0, pose.features[k]);
+            match act {
+                Act::Tilts(joint) => bent.tilt(joint, feature.map(|f| offset * f)),
+                Act::Turns(joint) => {
+                    if let Some(angle) = bent.joints_rad.get_mut(joint) {
+                        *angle += offset * feature[0];
+                    }
+                }
             }
         }
     }
 
     fn with_columns(&self, robot: &Robot, links: &Links, pose: &PoseConstants, bent: &Bent) -> Place {
-        let screws = Screws::with_links(bent, &robot.tool_mm, links);
+        let screws = Screws::with_links(bent, &robot.tool_mm, links, &pose.turns);
         let columns = |of: &dyn Fn(Parameter, Feature) -> Vector3<f64>| {
             let all = self.parameters.iter().zip(&pose.features).map(|(&p, &f)| of(p, f));
             Matrix3xX::from_iterator(self.parameters.len(), all.flat_map(<[f64; 3]>::from))

@@ -42,14 +42,17 @@ impl Points {
         spots.iter().all(|s| s.on_body_mm.is_none()) && spread.trace() - along < LINE * LINE * along
     }
 
-    /// Where the search for the transform starts. Of points on a line the turn about it has a second optimum, and small steps may end in either:
-    /// they start from the best turn for equal weights.
+    /// Where the search for the transform starts: at the best for equal weights, where points alone tell it; that is the end where they weigh
+    /// alike. Of points on a line the turn about it has a second optimum, and small steps from elsewhere may end in either.
     pub(super) fn start(&self, places: &[Place]) -> Transform {
-        if !self.on_a_line {
+        if self.oriented && !self.on_a_line {
             return self.sensor_from_base;
         }
-        let weighted = |s: &Spot| (places[s.pose].point_mm, s.point_mm, s.weight * s.weight);
-        fitted_frame(self.spots.iter().map(weighted))
+        let at = |s: &Spot| {
+            let place = &places[s.pose];
+            place.point_mm + Points::on_body(place, &self.flange_from_target, s).unwrap_or_else(Vector3::zeros)
+        };
+        fitted_frame(self.spots.iter().map(|s| (at(s), s.point_mm, s.weight * s.weight)))
     }
 
     /// Numbers that were measured with some weight.
@@ -245,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn points_on_a_line_start_at_the_best_turn_about_it_and_others_where_they_were_told() {
+    fn points_start_at_the_best_turn_and_orientations_where_they_were_told() {
         for turn_rad in [0.3, 1.7, 3.1] {
             let sensor_from_base = transform(Vector3::new(turn_rad, 0.0, 0.0), Vector3::new(10.0, -70.0, 900.0));
             let elsewhere = transform(Vector3::new(turn_rad + 3.0, 0.1, 0.0), Vector3::zeros());
@@ -256,8 +259,13 @@ mod tests {
                 let miss = misses.fold(0.0, f64::max);
                 assert!(points.on_a_line && miss < 1e-6, "{turn_rad} rad {off_mm} mm: {} {miss}", points.on_a_line);
             }
-            let (points, places) = along(30.0, sensor_from_base, elsewhere);
-            assert_eq!((points.on_a_line, points.start(&places)), (false, elsewhere));
+            let (mut points, places) = along(30.0, sensor_from_base, elsewhere);
+            assert!(
+                !points.on_a_line
+                    && (points.start(&places).inverse() * sensor_from_base).translation.vector.norm() < 1e-6
+            );
+            points.oriented = true;
+            assert_eq!(points.start(&places), elsewhere);
         }
     }
 }
