@@ -11,9 +11,10 @@ use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{EVIDENCE, Raw, Scatter};
 use crate::statistics::median;
 
-/// Least scatter, mm and rad: far below any instrument; keeps weights finite for exact data.
-pub(super) const LEAST_MM: f64 = 1e-7;
-const LEAST_RAD: f64 = 1e-10;
+/// Least scatter, mm and rad: below any instrument that reads a robot. Exact data would weigh so much that what decides between models and
+/// tolerances, a difference of sums of squares of all offsets, is lost in rounding.
+pub(super) const LEAST_MM: f64 = 1e-5;
+const LEAST_RAD: f64 = 1e-7;
 
 /// Largest scatter, mm.
 const LARGEST_MM: f64 = 1e5;
