@@ -9,8 +9,9 @@ use crate::formats::checked;
 use crate::geometry::{Transform, rotation_matrix};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
+use crate::identify::judge::lengths::Lengths;
 use crate::identify::judge::placement::{Placed, Uncertain, is_held};
-use crate::identify::judge::uncertainty::{Lengths, region};
+use crate::identify::judge::uncertainty::region;
 use crate::robot::{Check, Parameter};
 
 /// The file's name in a results folder.

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Point3, Vector3};
 
 use crate::geometry::{Transform, rigid_columns, rotation_matrix, transform_from_matrix};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::uncertainty::Lengths;
+use crate::identify::judge::lengths::Lengths;
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::rows::Rows;
@@ -198,11 +198,12 @@ impl Placed {
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {
         let poses = set.poses.iter().enumerate().filter(|(_, pose)| pose.group == self.groups[index].0);
         let poses = poses.map(|(row, pose)| (pose.joints_rad.as_slice(), set.shared.get(row))).collect::<Vec<_>>();
-        let square = |(_, columns): (Point3<f64>, DMatrix<f64>)| {
-            let covariance = &columns * &self.covariance * columns.transpose();
-            covariance.trace() + (columns * &self.of_sensor).norm_squared() + self.fresh_mm2
+        let covariance = |(_, columns): (Point3<f64>, DMatrix<f64>)| {
+            let of_sensor = &columns * &self.of_sensor;
+            let total = &columns * &self.covariance * columns.transpose() + &of_sensor * of_sensor.transpose();
+            Matrix3::from_fn(|r, c| total[(r, c)]) + Matrix3::identity() * (self.fresh_mm2 / 3.0)
         };
-        Lengths::of_squares(&self.columns(index, &poses).into_iter().map(square).collect::<Vec<f64>>())
+        Lengths::new(&self.columns(index, &poses).into_iter().map(covariance).collect::<Vec<_>>())
     }
 }
 

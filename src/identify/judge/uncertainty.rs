@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::lengths::{Length, Lengths, MEAN_OVER_RMS};
 use crate::identify::model::kinematics::Kinematics;
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
@@ -60,36 +61,6 @@ pub struct Expected {
     pub map: Vec<(String, f64)>,
 }
 
-/// Lengths of errors to expect over some poses.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Lengths {
-    /// Mean over the poses of the expected length, mm.
-    pub mean_mm: f64,
-    /// 95 % are below, mm.
-    pub p95_mm: f64,
-    /// Expected length at the worst pose, mm.
-    pub max_mm: f64,
-}
-
-impl Lengths {
-    /// Of the mean square of the error at each pose, mm^2.
-    pub fn of_squares(squares_mm2: &[f64]) -> Lengths {
-        let count = squares_mm2.len().max(1) as f64;
-        let lengths: Vec<f64> = squares_mm2.iter().map(|s| MEAN_OVER_RMS * s.sqrt()).collect();
-        Lengths {
-            mean_mm: lengths.iter().sum::<f64>() / count,
-            p95_mm: P95_OVER_RMS * (squares_mm2.iter().sum::<f64>() / count).sqrt(),
-            max_mm: lengths.iter().copied().fold(0.0, f64::max),
-        }
-    }
-}
-
-/// Mean length of a vector of three normal numbers over the root of the mean of its square.
-pub const MEAN_OVER_RMS: f64 = 0.921_317_731_923_561_3;
-
-/// 95 % quantile of the length of three equal normal numbers over the root of the mean of its square.
-const P95_OVER_RMS: f64 = 1.613_973;
-
 impl Expected {
     /// At poses like those of the set, the placements fitted to `fitted`: at a row that was fitted it is that of a fit without it.
     pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
@@ -110,7 +81,9 @@ impl Expected {
         let scatter_mm2 = formulation.rows.scatter.fresh_mm2();
         // Readings are off by what placements share, too.
         let smooth_mm2 = formulation.rows.left_by_smooth_mm2();
-        let (mut squares, mut of_robots) = (vec![0.0; places.len()], vec![0.0; places.len()]);
+        let fresh = Matrix3::identity() * (scatter_mm2 + smooth_mm2);
+        let mut of_robots = vec![Matrix3::zeros(); places.len()];
+        let mut of_errors = of_robots.clone();
         for group in 0..set.groups.len() {
             let motion = |i: usize| rigid_columns(&places[i].point_mm.coords);
             let mut normal = DMatrix::zeros(count + 6, count + 6);
@@ -122,21 +95,21 @@ impl Expected {
             let Eliminated { follow, inverse, .. } = Eliminated::new(&normal, count);
             for i in set.rows(|pose| pose.group == group) {
                 let columns = &places[i].point_columns - motion(i) * &follow;
-                let of_robot = (&columns * &covariance * columns.transpose()).trace();
+                let of_robot = &columns * &covariance * columns.transpose() * times[i];
                 // The placement itself is found through the scatter of the rows it is fitted to.
-                let of_frame = (motion(i) * &inverse * motion(i).transpose()).trace() * scatter_mm2;
-                of_robots[i] = times[i] * of_robot;
-                squares[i] = times[i] * (of_robot + of_frame) + 3.0 * (scatter_mm2 + smooth_mm2);
+                let of_frame = motion(i) * &inverse * motion(i).transpose() * (times[i] * scatter_mm2);
+                of_robots[i].copy_from(&of_robot);
+                of_errors[i].copy_from(&(of_robot + of_frame + fresh));
             }
         }
-        let of_rows = |all: &[f64]| rows.iter().map(|&row| all[row]).collect::<Vec<f64>>();
-        let Lengths { mean_mm, p95_mm, max_mm } = Lengths::of_squares(&of_rows(&squares));
-        let length = |row: &usize| (set.poses[*row].name.clone(), MEAN_OVER_RMS * squares[*row].sqrt());
+        let of_rows = |all: &[Matrix3<f64>]| Lengths::new(&rows.iter().map(|&row| all[row]).collect::<Vec<_>>());
+        let Lengths { mean_mm, p95_mm, max_mm } = of_rows(&of_errors);
+        let length = |row: &usize| (set.poses[*row].name.clone(), Length::new(&of_errors[*row]).mean_mm());
         Expected {
             mean_mm,
             p95_mm,
             max_mm,
-            of_robot_mm: Lengths::of_squares(&of_rows(&of_robots)).mean_mm,
+            of_robot_mm: of_rows(&of_robots).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
             poses: region(set),
             joint_ranges: ranges(set),
