@@ -6,6 +6,7 @@ use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
+use crate::identify::judge::errors::Judge;
 use crate::identify::record::file::Smooth;
 use crate::identify::record::{left_out, plausible, rounded};
 use crate::identify::run::Identification;
@@ -45,13 +46,15 @@ impl Findings {
             || (left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM).then(|| conventions::unexplained(left_mm));
         let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
-        let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers);
-        let (of_still, of_end): (Vec<_>, Vec<_>) = left_out.into_iter().partition(|left_out| left_out.is_still);
+        let errors = |set: &Dataset| {
+            let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
+            judge.errors(found.robot(), &found.outliers)
+        };
+        let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers, &errors);
         let rounded = rounded::of_joints(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
-        let against: Vec<Finding> = of_still
+        let against: Vec<Finding> = left_out
             .into_iter()
-            .map(|left_out| left_out.finding)
             .chain(of_rounding)
             .chain(unexplained)
             .chain(plausible::of_another_robot(found))
@@ -62,12 +65,11 @@ impl Findings {
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
-        let of_rows = of_end.into_iter().map(|left_out| left_out.finding).chain(rounded);
         let terms = plausible::of_terms(found);
         let doubts = examined
             .into_iter()
             .chain(along.instead.clone())
-            .chain(of_rows)
+            .chain(rounded)
             .chain(of_verify(set, found))
             .chain(scale)
             .chain(terms)
