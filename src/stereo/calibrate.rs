@@ -47,6 +47,8 @@ pub struct Calibration {
     pub priors: Priors,
     /// What each camera leaves of its own pictures, the median over them, px.
     pub alone_px: f64,
+    /// Whether the lenses are those that each camera alone told, because something moved between the two pictures of the pairs.
+    pub each_alone: bool,
     /// How many of the first or last pairs are in it although they contradict the others.
     pub runs: usize,
     /// How the pairs scatter about the common rig; the covariance allows for more than the corners' noise lets expect.
@@ -141,12 +143,23 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
 /// can be found over the series.
 pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
+    calibrate_by(corners, options, runs, false)
+}
+
+/// The same with the lenses that the pairs tell, whatever each camera alone tells of them; runs stay in.
+pub fn calibrate_by_pairs(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
+    calibrate_by(corners, options, true, true)
+}
+
+fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let Choice { layout, near, priors, scatter, scores: lens_scores } =
-        lens_ladder::choose(&start, missed, &corners.board, options).map_err(|e| e.without(&skipped))?;
+        lens_ladder::choose(&start, Some(missed).filter(|_| !by_pairs), &corners.board, options)
+            .map_err(|e| e.without(&skipped))?;
     let known = options.known.as_ref();
+    let each_alone = known.is_none() && scatter.is_some();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));
     let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
         .solve(&layout)
@@ -177,6 +190,7 @@ pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Resul
         witnesses,
         inflation,
         priors,
+        each_alone,
         runs,
         alone_px: missed.alone_px,
         skipped,

@@ -8,7 +8,7 @@
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
-use crate::stereo::calibrate::{Calibration, calibrate, calibrate_with};
+use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by_pairs, calibrate_with};
 use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, without_drift};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -43,8 +43,13 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
 }
 
 fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let with_runs = calibrate_with(corners, &asked.options, true);
+    let mut with_runs = calibrate_with(corners, &asked.options, true);
     let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
+    if with_runs.as_ref().is_ok_and(|found| found.each_alone)
+        && let Some((by_pairs, change)) = by_pairs(corners, asked)
+    {
+        (with_runs, told) = (Ok(by_pairs), Some(change));
+    }
     if let (Ok(all), Some(change)) = (&with_runs, &mut told)
         && let Some(later) = later(corners, asked, all, change)
     {
@@ -59,6 +64,15 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
         // What contradicts the others is no rig of its own, or too few pairs of one: it is left out.
         _ => without_runs(corners, asked, told),
     }
+}
+
+/// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig by more than each camera
+/// misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and looks like something that moved between the two.
+fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
+    let found = calibrate_by_pairs(corners, &asked.options).ok().filter(|found| found.runs == 0)?;
+    let change = change(&found, asked).filter(|change| change.kind == Kind::Drift)?;
+    let still = without_drift::at_share(&found, corners, &asked.options, change.along.as_ref()?, MIDDLE)?;
+    (!still.each_alone).then_some((found, change))
 }
 
 /// The rig that stands since a step.

@@ -21,15 +21,14 @@ use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
 /// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose pictures were not taken at one
-/// moment, the lenses are expected to be those; which model, the pairs say, where they say anything.
-pub fn choose(start: &Problem, missed: Missed, board: &Board, options: &Options) -> Result<Choice, Error> {
+/// moment, the lenses are expected to be those; which model, the pairs say, where they say anything. `missed` is how far pictures are missed,
+/// where that may decide.
+pub fn choose(start: &Problem, missed: Option<Missed>, board: &Board, options: &Options) -> Result<Choice, Error> {
     if let Some(known) = &options.known {
         return known_lenses::choose(start, board, known, options);
     }
     let of_pairs = of_pairs(start, board, options);
-    if !missed.is_better_alone() {
-        return of_pairs;
-    }
+    let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
     let of = |Choice { layout, near, priors, .. }: &Choice| {
         let values = near.clone().unwrap_or_else(|| start.values.clone());
         Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout).ok()
