@@ -204,7 +204,7 @@ fn places_out_of_reach_name_one_that_is_not() {
 #[test]
 fn every_common_arm_has_a_plan() {
     for arm in catalogue::ARMS {
-        let quick = Settings { pool: 300, samples: 20, verify: 4, ..settings() };
+        let quick = Settings { pool: 150, samples: 20, verify: 4, ..settings() };
         let found = plan(&arm.robot(), &scene(), &quick, None);
         assert!(found.is_ok(), "{}: {}", arm.name, found.err().map(|e| e.to_string()).unwrap_or_default());
     }

@@ -79,7 +79,7 @@ fn parts_cut_by_the_border_are_as_certain_as_they_say() {
     let plain = [(70.0, 0.0), (-40.0, 45.0)];
     for (board, places) in [(BOARD, &coded[..]), ("checker:9x7:20", &plain[..])] {
         // Squares of 125, 74 and 52 px, and lenses that bend lines not at all, as the paper's do, and more than a row of squares tells.
-        for (z, bent) in [(250.0, 0.0), (250.0, 1.0), (420.0, 1.0), (600.0, 1.0), (600.0, -4.0)] {
+        for (z, bent) in [(250.0, 0.0), (420.0, 1.0), (600.0, -4.0)] {
             let mut all: Vec<f64> = Vec::new();
             for (k, (turn, (x, y))) in turns.iter().flat_map(|turn| places.iter().map(|at| (*turn, at))).enumerate() {
                 let place = [x * z / 420.0, y * z / 420.0, z];

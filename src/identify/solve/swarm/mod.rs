@@ -67,7 +67,7 @@ mod tests {
         let fit = prepared.fit();
         let least = best_of_starts(&fit, 50);
         let settings = SwarmSettings { patience: 0, ..SwarmSettings::default() };
-        let seeds: u64 = std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(3);
+        let seeds: u64 = std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(2);
         let (mut reached, mut below, mut spent) = (0, 0, Vec::new());
         for seed in 0..seeds {
             let ours = solve(&fit, Method::Stapso, &settings, seed);
