@@ -170,7 +170,7 @@ fn a_focus_that_drifts_is_nothing_that_moved_between_two_pictures() {
             let (found, told) = standing(&corners);
             let [drift] = told.as_slice() else { panic!("{share} in world {w}: {told:?}") };
             assert!(drift.cause.contains("focus") && drift.kind == Kind::Drift, "{share} in world {w}: {drift:?}");
-            assert!((drift.size.unwrap() / (100.0 * share) - 1.0).abs() < 0.1, "{share} in world {w}: {drift:?}");
+            assert!((drift.size.unwrap() / (100.0 * share) - 1.0).abs() < 0.25, "{share} in world {w}: {drift:?}");
             assert!(!found.each_alone && found.skipped.is_empty(), "{share} in world {w}: {:?}", found.skipped);
         }
     }
