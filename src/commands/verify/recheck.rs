@@ -56,11 +56,14 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let said = |same| format!("this robot was {how} {same}: only new poses tell whether it still is that robot");
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
+    let beyond = beyond::ranges(against, &robot, &set, &set.rows(|_| true));
     let advice = check.as_ref().and_then(|check| check.warning(against));
     let warnings: Vec<String> =
-        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).collect();
+        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).chain(beyond).collect();
     warnings.iter().for_each(progress::warn);
+    let step = progress::bar("comparing with the robot as it was", 0);
     let found = within_ranges(recheck(&set, &robot, &before, &placed)?, (&set, &robot), against, &before, &placed);
+    step.finish_and_clear();
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
     let own_data = whole.is_some() || own.all;
