@@ -211,14 +211,14 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
         format!("max{limits}"),
     ];
     let cell = |v: &Value| if v.variable { format!("q + {}", v.number) } else { v.number.to_string() };
-    let row = |(((line, row), slides), limits): (((&u64, &[Value; 4]), &bool), &Option<[Value; 2]>)| {
-        let limits = limits.map(|limits| limits.map(|v| v.number)).filter(|[low, high]| low < high);
+    let row = |joint: usize| {
+        let (line, row) = &links.rows[joint];
+        let limits = links.limits[joint].map(|limits| limits.map(|v| v.number)).filter(|[low, high]| low < high);
         let limits = limits.map_or([const { String::new() }; 2], |limits| limits.map(|v| v.to_string()));
-        let sigma = u8::from(*slides).to_string();
+        let sigma = u8::from(links.slides[joint]).to_string();
         (*line, Fields::new(row.iter().map(cell).chain([sigma]).chain(limits)))
     };
-    let parameters = links.rows.iter().map(|(line, row)| (line, row));
-    let rows: Vec<(u64, Fields)> = parameters.zip(&links.slides).zip(&links.limits).map(row).collect();
+    let rows: Vec<(u64, Fields)> = (0..links.rows.len()).map(row).collect();
     let grid = Grid { rows: rows.clone(), ..empty(path) };
     let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
     let mut found = reading(&table, [0, 1, 2, 3])?;
