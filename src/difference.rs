@@ -23,8 +23,31 @@ const HIDDEN: f64 = 1.5;
 pub struct Difference {
     /// Second minus first.
     pub off: DVector<f64>,
-    joint: Cholesky<f64, Dyn>,
+    joint: Joint,
     freedom: f64,
+}
+
+/// A covariance, ready to be divided by.
+enum Joint {
+    Whole(Cholesky<f64, Dyn>),
+    /// A unit matrix and the product of columns with themselves, of which there are few: these, and what they leave in their own coordinates (Woodbury).
+    Beyond(DMatrix<f64>, Cholesky<f64, Dyn>),
+}
+
+impl Joint {
+    fn solve(&self, v: &DVector<f64>) -> DVector<f64> {
+        match self {
+            Joint::Whole(whole) => whole.solve(v),
+            Joint::Beyond(columns, inner) => v - columns * inner.solve(&columns.tr_mul(v)),
+        }
+    }
+}
+
+/// Degrees of freedom of a variance of which `scatter` is over that by the readings' noise, as so many units tell.
+fn freedom(pairs: usize, scatter: f64) -> f64 {
+    let hidden = 1.0 + HIDDEN / (pairs.max(1) as f64).sqrt();
+    let share = 1.0 - 1.0 / scatter.max(hidden);
+    (pairs.saturating_sub(1).max(1) as f64 / (share * share)).min(KNOWN)
 }
 
 impl Difference {
@@ -32,11 +55,19 @@ impl Difference {
     /// little as they are few, and of the rest much (Welch and Satterthwaite). Where no scatter was seen, as much as chance hides may be
     /// there. `None` where the covariance is singular.
     pub fn new(off: DVector<f64>, joint: &DMatrix<f64>, pairs: usize, scatter: f64) -> Option<Difference> {
-        let joint = (0.5 * (joint + joint.transpose())).cholesky()?;
-        let hidden = 1.0 + HIDDEN / (pairs.max(1) as f64).sqrt();
-        let share = 1.0 - 1.0 / scatter.max(hidden);
-        let freedom = (pairs.saturating_sub(1).max(1) as f64 / (share * share)).min(KNOWN);
-        Some(Difference { off, joint, freedom })
+        let joint = Joint::Whole((0.5 * (joint + joint.transpose())).cholesky()?);
+        Some(Difference { off, joint, freedom: freedom(pairs, scatter) })
+    }
+
+    /// The same of numbers that are known to a unit each, and beside that to the product of these columns with themselves.
+    pub fn of_white(off: DVector<f64>, columns: DMatrix<f64>, pairs: usize) -> Option<Difference> {
+        let (numbers, count) = columns.shape();
+        if numbers <= count {
+            let whole = DMatrix::identity(numbers, numbers) + &columns * columns.transpose();
+            return Difference::new(off, &whole, pairs, 1.0);
+        }
+        let inner = (DMatrix::identity(count, count) + columns.transpose() * &columns).cholesky()?;
+        Some(Difference { off, joint: Joint::Beyond(columns, inner), freedom: freedom(pairs, 1.0) })
     }
 
     /// Squared difference in units of its covariance.
@@ -109,5 +140,22 @@ mod tests {
         let (amount, _) = difference.along(&along).unwrap();
         assert!((amount - 0.7).abs() < 1e-12 && difference.left_by(&[along]).unwrap() < 1e-12);
         assert!(difference.log_likelihood(0.0) > difference.log_likelihood(difference.chi_square()));
+    }
+
+    #[test]
+    fn few_columns_beside_a_unit_are_the_covariance_that_they_make() {
+        for (numbers, count) in [(5, 8), (40, 8), (300, 3)] {
+            let columns = DMatrix::from_fn(numbers, count, |r, c| 100.0 * ((1 + 7 * r + 13 * c * c) as f64).sin());
+            let off = DVector::from_fn(numbers, |r, _| ((3 * r) as f64).cos());
+            let along = DVector::from_fn(numbers, |r, _| ((r * r) as f64).sin());
+            let whole = DMatrix::identity(numbers, numbers) + &columns * columns.transpose();
+            let whole = Difference::new(off.clone(), &whole, 60, 1.0).unwrap();
+            let few = Difference::of_white(off, columns, 60).unwrap();
+            assert!((whole.chi_square() / few.chi_square() - 1.0).abs() < 1e-8);
+            let [(a, of_a), (b, of_b)] = [&whole, &few].map(|difference| difference.along(&along).unwrap());
+            assert!((a - b).abs() < 1e-8 * of_a && (of_a / of_b - 1.0).abs() < 1e-8, "{a} {b} {of_a} {of_b}");
+            let [a, b] = [&whole, &few].map(|difference| difference.left_by(std::slice::from_ref(&along)).unwrap());
+            assert!((a / b - 1.0).abs() < 1e-8 && whole.limit(3, 0.01) == few.limit(3, 0.01));
+        }
     }
 }

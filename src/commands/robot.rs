@@ -107,7 +107,7 @@ fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error
     }
     let why = ways.first().map_or(String::new(), |(r, _)| format!(": {} ({})", r.convention().1, r.said));
     let message = format!(
-        "whether alpha and a of a row stand before the joint or behind it is not said, and the table could be either{why}"
+        "whether alpha and a of a row stand before the joint or behind it is open, and the table could be either{why}"
     );
     let hint = "`--dh modified` (Craig: before) or `--dh classic` (Denavit and Hartenberg: behind) says which; `--measurements FILE` lets the readings decide";
     refuse(args, message, hint)

@@ -21,6 +21,10 @@ const TO_RADIANS: [&str; 4] = ["radians", "rad", "toradians", "to_radians"];
 /// Functions that do, and numbers to multiply with.
 const PER_DEGREE: [&str; 6] = ["deg2rad", "d2r", "degtorad", "deg_to_rad", "dtor", "to_rad"];
 
+/// Functions of numbers, whose arguments may be angles and whose values are none.
+type Function = fn(f64) -> f64;
+const FUNCTIONS: [(&str, Function); 4] = [("sin", f64::sin), ("cos", f64::cos), ("tan", f64::tan), ("sqrt", f64::sqrt)];
+
 /// Names of parts of a half turn, with what they are of it.
 const OF_PI: [(&str, f64); 7] =
     [("pi", 1.0), ("m_pi", 1.0), ("π", 1.0), ("m_pi_2", 0.5), ("half_pi", 0.5), ("m_pi_4", 0.25), ("two_pi", 2.0)];
@@ -156,6 +160,15 @@ impl Parser<'_> {
         })
     }
 
+    /// A function of what stands in its brackets, the first of which was read; none of a joint's variable, for which no number stands.
+    fn applied(&mut self, function: Function, depth: usize) -> Option<f64> {
+        let (radians, variable) = (self.radians, std::mem::take(&mut self.variable));
+        let inside = self.sum(depth + 1)?;
+        let is_number = self.takes(')') && !self.variable;
+        (self.radians, self.variable) = (radians, variable);
+        is_number.then(|| function(inside))
+    }
+
     fn name(&mut self, depth: usize) -> Option<f64> {
         let is_part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '{' | '}');
         let end = self.rest.find(|c| !is_part(c)).unwrap_or(self.rest.len());
@@ -169,6 +182,11 @@ impl Parser<'_> {
             let degrees = self.sum(depth + 1)?;
             self.radians = true;
             return self.takes(')').then(|| degrees.to_radians());
+        }
+        if let Some((_, function)) = FUNCTIONS.iter().find(|(name, _)| *name == lower)
+            && self.takes('(')
+        {
+            return self.applied(*function, depth);
         }
         if let Some((_, part)) = OF_PI.iter().find(|(name, _)| *name == lower) {
             self.radians = true;
@@ -249,7 +267,29 @@ mod tests {
         ] {
             assert_eq!(of(text), Some((number, false, true)), "{text}");
         }
-        for text in ["", "a1", "-q2", "90 - theta_3", "pi2", "pi/", "2 3", "x+1", "2**3", "(1", "1/0", "nan", "1e999"] {
+        let (sine, radians, _) = of("0.2 + sin(pi/6)/np.sqrt(4) * 2").unwrap();
+        assert!((sine - 0.7).abs() < 1e-12 && !radians);
+        for text in [
+            "",
+            "a1",
+            "-q2",
+            "90 - theta_3",
+            "cos(q1)",
+            "sin",
+            "sin(",
+            "sin(1",
+            "sqrt(-1)",
+            "asin(1)",
+            "pi2",
+            "pi/",
+            "2 3",
+            "x+1",
+            "2**3",
+            "(1",
+            "1/0",
+            "nan",
+            "1e999",
+        ] {
             assert_eq!(of(text), None, "{text}");
         }
         assert_eq!(of(&"(".repeat(10_000)), None);

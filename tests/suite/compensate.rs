@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use camino::Utf8Path;
+use stereocal::files::provenance::Digested;
 use stereocal::robot::{Advice, Check, Robot, catalogue, file, inverse};
 
 use crate::run::{stderr, stdout, stereocal, workplace};
@@ -261,7 +262,21 @@ fn exchanged_robots_are_refused() {
     let found = std::fs::read_to_string(at("identified.toml")).unwrap();
     std::fs::write(at("identified.toml"), format!("# stereocal identify\n# Identified; expected\n{found}")).unwrap();
     std::fs::write(at("one.mod"), rapid(&postures(&nominal, 2), "")).unwrap();
-    run(folder.path(), &["one.mod"], 0);
+    let said = run(folder.path(), &["one.mod"], 0);
+    assert!(!said.contains("itself a robot"), "{said}");
+    // Two that were found, and none of them from the other: the targets may be of neither.
+    let nominal = std::fs::read_to_string(at("robot.toml")).unwrap();
+    std::fs::write(at("robot.toml"), format!("# stereocal identify\n# Identified; expected\n{nominal}")).unwrap();
+    let said = run(folder.path(), &["one.mod", "--force"], 0);
+    assert!(said.contains("--robot robot.toml is itself a robot that `identify` found"), "{said}");
+    let robot = Digested::read(Utf8Path::from_path(&at("robot.toml")).unwrap());
+    let run_of = serde_json::json!({"program": "", "date": "", "command": "", "inputs": [robot], "outputs": []});
+    let record = serde_json::json!({"provenance": run_of}).to_string();
+    std::fs::write(at("identification.json"), record).unwrap();
+    let said = run(folder.path(), &["one.mod", "--force"], 0);
+    assert!(!said.contains("itself a robot"), "{said}");
+    std::fs::remove_file(at("identification.json")).unwrap();
+    std::fs::write(at("robot.toml"), nominal).unwrap();
     std::fs::rename(at("robot.toml"), at("aside.toml")).unwrap();
     std::fs::rename(at("identified.toml"), at("robot.toml")).unwrap();
     std::fs::rename(at("aside.toml"), at("identified.toml")).unwrap();

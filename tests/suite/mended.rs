@@ -300,15 +300,22 @@ fn a_change_where_the_robot_was_not_identified_is_one_only_where_it_is_large() {
         });
         let against =
             ["verify", "--measurements", "new.csv", "--against", "out/identified.toml", "--out", "checks", "--force"];
-        stdout(&stereocal(at, &against))
+        let output = stereocal(at, &against);
+        (stdout(&output), stderr(&output))
     };
     for (json, by_deg, standing, word) in [
         (&of_all, 0.2, "CHANGED", "the zero of joint 4"),
         (&elsewhere, 0.2, "UNDECIDED", "these poses stand where the robot was not identified (joint 4 in 12 rows"),
         (&elsewhere, 5.0, "CHANGED", "the zero of joint 4"),
     ] {
-        let told = said(json, by_deg);
+        let (told, _) = said(json, by_deg);
         assert!(told.starts_with(standing) && told.contains(word), "{by_deg}: {told}");
     }
-    assert!(!said(&elsewhere, 0.0).contains("CHANGED"));
+    let (told, warned) = said(&elsewhere, 0.0);
+    assert!(!told.contains("CHANGED"));
+    // As `verify` without `--against` says it, of a robot that has such terms.
+    let has_terms = std::fs::read_to_string(at.join("out/identified.toml")).unwrap().contains("terms =");
+    assert_eq!(warned.contains("are outside: joint 4 in 12 rows"), has_terms, "{warned}");
+    let (_, warned) = said(&of_all, 0.0);
+    assert!(!warned.contains("are outside"), "{warned}");
 }

@@ -8,7 +8,7 @@ use crate::config;
 use crate::files::provenance::{Digested, Provenance};
 use crate::formats::targets::Row;
 use crate::progress;
-use crate::robot::Robot;
+use crate::robot::{Robot, file};
 
 /// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them.
 pub(super) fn refuse_corrected(targets: &Utf8Path) -> Result<()> {
@@ -23,6 +23,22 @@ pub(super) fn refuse_corrected(targets: &Utf8Path) -> Result<()> {
         hint: format!("give the targets as they were written for the nominal robot; that run was `{}`", run.command),
     }
     .into())
+}
+
+/// That both robots are ones that `identify` found, and the second was not found from the first.
+pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<String> {
+    if !file::is_identified(robot) || !file::is_identified(identified) {
+        return None;
+    }
+    let made_by = Provenance::of_json(&identified.with_file_name("identification.json"));
+    let here = Digested::read(robot)?;
+    let is_made_of = made_by.is_some_and(|run| run.inputs.iter().any(|input| input.sha256 == here.sha256));
+    (!is_made_of).then(|| {
+        format!(
+            "--robot {robot} is itself a robot that `identify` found, and {identified} was not identified from it: the targets are taken as written \
+             for it; where they were written for the nominal robot, `--robot` names the file that `identify` was given"
+        )
+    })
 }
 
 /// Warns of joint targets that look like radians in degrees, and of joints that have no limits.

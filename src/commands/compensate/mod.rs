@@ -24,6 +24,7 @@ use told::{Summary, said};
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     doubts::refuse_corrected(&args.targets)?;
     let pair = Pair::read(args)?;
+    doubts::of_nominal(&args.robot, &args.identified).iter().for_each(progress::warn);
     let nominal = &pair.nominal;
     let heeded = heed(pair.check.as_ref(), &args.identified);
     let slides: Vec<bool> = nominal.joints.iter().map(|j| j.slides).collect();

@@ -56,15 +56,15 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let said = |same| format!("this robot was {how} {same}: only new poses tell whether it still is that robot");
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
+    let beyond = beyond::ranges(against, &robot, &set, &set.rows(|_| true));
     let advice = check.as_ref().and_then(|check| check.warning(against));
     let warnings: Vec<String> =
-        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).collect();
+        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).chain(beyond).collect();
     warnings.iter().for_each(progress::warn);
-    let found = within_ranges(recheck(&set, &robot, &before, &placed)?, (&set, &robot), against, &before, &placed);
+    let found = compared((&set, &robot), against, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
-    let own_data = whole.is_some() || own.all;
-    let content = RobotRecheckFile::new(&found, against, tolerance_mm, own_data);
+    let content = RobotRecheckFile::new(&found, against, tolerance_mm, whole.is_some() || own.all);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
         date,
@@ -96,27 +96,30 @@ fn of_targets(rows: &[Measurement], against: &Utf8Path) -> std::result::Result<D
     }
 }
 
-/// The same, where rows are outside of the ranges that the robot was identified in. A change that its model may lack there, nothing single or the zero
-/// of a joint that is outside, is none where the other rows do not show it as well, and it is no more than what was corrected of the robot.
-fn within_ranges(
-    found: Recheck,
+/// Whether the robot changed, by these rows. Where rows are outside of the ranges that it was identified in, a change that its model may lack there,
+/// nothing single or the zero of a joint that is outside, is none where the other rows do not show it as well, and it is no more than what was
+/// corrected of the robot.
+fn compared(
     (set, robot): (&Dataset, &Robot),
     against: &Utf8Path,
     before: &Before,
     placed: Stood,
-) -> Recheck {
+) -> std::result::Result<Recheck, Error> {
+    // Held to the end: it says that this runs.
+    let _step = progress::bar("comparing with the robot as it was", 0);
+    let found = recheck(set, robot, before, placed)?;
     let Outside { joints, rows } = beyond::outside(against, robot, set, &set.rows(|_| true));
     let is_outside = |cause: &str| joints.iter().any(|(joint, _)| cause == format!("joint-{}", joint + 1));
     let is_lacking = found.likeliest.is_empty() || found.likeliest.iter().any(|(cause, _)| is_outside(cause));
     if !found.changed || joints.is_empty() || !is_lacking || found.effect_mm > found.correction_mm {
-        return found;
+        return Ok(found);
     }
     let inside = set.clone().without(&rows, "it is outside of the ranges that the robot was identified in");
     let enough = inside.placing_rows(FEWEST_POSES + 1).is_ok();
-    match enough && recheck(&inside, robot, before, placed).is_ok_and(|of_inside| of_inside.changed) {
+    Ok(match enough && recheck(&inside, robot, before, placed).is_ok_and(|of_inside| of_inside.changed) {
         true => found,
         false => Recheck { extrapolated: joints.into_iter().map(|(_, said)| said).collect(), ..found },
-    }
+    })
 }
 
 /// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from are not known again in others.

@@ -1,6 +1,6 @@
 //! What the words around a table say: its convention, and the units of its angles and lengths.
 //!
-//! In: comments, titles and sentences, and the text of a program without them. Out: what is said once; what is said both ways is not said. A unit counts where the
+//! In: comments, titles and sentences, and the text of a program without them. Out: what is said once; a unit that is said both ways is not said. A unit counts where the
 //! words say that something is in it (`lengths in cm`, `Unit [radian]`, `units: mm, deg`), and not on lines about limits and speeds; a convention
 //! where the line is about Denavit and Hartenberg. What goes wrong: words about something else; what the numbers rule out is not heard.
 
@@ -11,6 +11,8 @@ use crate::tables::names::Unit;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Words {
     pub convention: Option<Convention>,
+    /// Whether they name both conventions.
+    pub both: bool,
     pub angle: Option<Unit>,
     pub length: Option<Unit>,
 }
@@ -56,7 +58,7 @@ impl Words {
             (false, true) => Some(Convention::Classic),
             _ => None,
         };
-        Words { convention, angle: once(angles), length: once(lengths) }
+        Words { convention, both: modified && classic, angle: once(angles), length: once(lengths) }
     }
 }
 
@@ -108,8 +110,10 @@ mod tests {
         }
         assert_eq!(of("the classic convention", ""), Some(Convention::Classic));
         assert_eq!(of("", "DHRobot(links, 'modified')"), Some(Convention::Modified));
-        for prose in ["modified by the author", "standard library", "standard DH, not modified DH"] {
-            assert_eq!(of(prose, ""), None, "{prose}");
+        for (prose, both) in
+            [("modified by the author", false), ("standard library", false), ("standard DH, not modified DH", true)]
+        {
+            assert_eq!((of(prose, ""), Words::of(prose, "").both), (None, both), "{prose}");
         }
     }
 }

@@ -1,7 +1,9 @@
 //! URDF: a serial chain out of a robot description, and the same description with other joint origins.
 //!
 //! In: XML text. Out: the joints from the root link to a tip link, lengths in mm. Joints that no serial chain of motors has
-//! (mimic, floating, planar) are refused with the longest chain that does without them.
+//! (mimic, floating, planar) are refused with the longest chain that does without them. Where the links fork, `branches` says which end is taken.
+
+mod branches;
 
 use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
@@ -13,15 +15,6 @@ use crate::progress;
 use crate::robot::Robot;
 use crate::robot::axes::{self, Axis};
 use crate::tables::expression;
-
-/// Names that descriptions give to the flange, the best first: taken where several links end the same chain.
-const FLANGES: [&str; 5] = ["tool0", "flange", "ee_link", "link8", "link_ee"];
-
-/// Words in the names of links and joints of a gripper.
-const FINGERS: [&str; 5] = ["finger", "gripper", "jaw", "knuckle", "thumb"];
-
-/// Joints of its own with which a branch is another arm: fingers have fewer.
-const OF_AN_ARM: usize = 5;
 
 /// What a joint does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -107,8 +100,11 @@ impl Urdf {
             .map_err(|e| refuse(Some(u64::from(e.pos().row)), format!("not readable as XML: {e}"), None))?;
         let root = document.root_element();
         if root.tag_name().name() != "robot" {
-            let message = format!("the file's root is <{}>; a URDF has <robot>", root.tag_name().name());
-            return Err(refuse(None, message, None));
+            let name = root.tag_name().name();
+            let mujoco = "this is a model of MuJoCo (MJCF): `pip install mjcf-urdf-simple-converter`, then `python3 -c \"from \
+                          mjcf_urdf_simple_converter import convert; convert('model.xml', 'robot.urdf')\"` makes a URDF of it; many makers publish one";
+            let message = format!("the file's root is <{name}>; a URDF has <robot>");
+            return Err(refuse(None, message, (name == "mujoco").then_some(mujoco)));
         }
         if document.descendants().any(|n| n.tag_name().namespace().is_some_and(|space| space.contains("xacro"))) {
             let hint = "expand it first: `xacro FILE > robot.urdf`";
@@ -141,7 +137,11 @@ impl Urdf {
     pub fn chain(&self, tip: Option<&str>) -> Result<Chain<'_>> {
         let tip = match tip {
             Some(tip) => tip.to_owned(),
-            None => self.flange()?,
+            None => {
+                let tip = self.flange()?;
+                self.left_out(&tip).iter().for_each(progress::warn);
+                tip
+            }
         };
         let mut joints = Vec::new();
         let mut link = tip.as_str();
@@ -186,50 +186,6 @@ impl Urdf {
             return Err(self.refuse(None, message, Some(hint)));
         }
         Ok(())
-    }
-
-    /// Links without a joint behind them.
-    fn ends(&self) -> Vec<String> {
-        let children = self.joints.iter().map(|j| &j.child);
-        children.filter(|link| !self.joints.iter().any(|j| j.parent == **link)).cloned().collect()
-    }
-
-    /// Names of the moving joints before a link.
-    fn moving(&self, tip: &str) -> Vec<&str> {
-        let before = |link: &str| self.joints.iter().find(|j| j.child == link);
-        let joints = std::iter::successors(before(tip), |joint| before(&joint.parent));
-        // Joints that form a circle have no end.
-        let joints = joints.take(self.joints.len());
-        joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str()).collect()
-    }
-
-    /// The end of the longest chain, where all other ends hang on it or a name tells; none where others are arms too.
-    fn flange(&self) -> Result<String> {
-        let ends = self.ends();
-        let longest = ends.iter().map(|e| self.moving(e).len()).max().unwrap_or(0);
-        let main: Vec<&String> = ends.iter().filter(|e| self.moving(e).len() == longest).collect();
-        let one_chain = main.windows(2).all(|w| self.moving(w[0]) == self.moving(w[1]));
-        let named = FLANGES.iter().find_map(|name| main.iter().find(|end| end.ends_with(name)));
-        let of_main = main.first().map_or_else(Vec::new, |end| self.moving(end));
-        let own = |end: &String| self.moving(end).iter().filter(|joint| !of_main.contains(joint)).count();
-        match (main.as_slice(), named) {
-            ([only], _) if ends.iter().all(|end| own(end) < OF_AN_ARM) => Ok((*only).clone()),
-            (_, Some(named)) if one_chain => Ok((*named).clone()),
-            _ => {
-                let list: Vec<String> = ends.iter().map(|e| format!("{e} ({} joints)", self.moving(e).len())).collect();
-                let message = format!("several links end a chain: {}", list.join(", "));
-                let usable = ends.iter().filter(|e| self.chain(Some(e)).is_ok());
-                // A finger is not where an arm ends.
-                let grips = |name: &str| FINGERS.iter().any(|finger| name.to_lowercase().contains(finger));
-                let of_arm = |e: &&String| !grips(e) && !self.moving(e).into_iter().any(grips);
-                let best =
-                    usable.max_by_key(|e| (of_arm(e), self.moving(e).len(), FLANGES.iter().any(|f| e.ends_with(f))));
-                let example =
-                    best.map_or(String::new(), |e| format!("; `--tip {e}` has the most joints that move on their own"));
-                let hint = format!("`--tip LINK` names the one that carries the target{example}");
-                Err(self.refuse(None, message, Some(hint)))
-            }
-        }
     }
 
     /// The text with other origins for some joints: everything else stays as it is.

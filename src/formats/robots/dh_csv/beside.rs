@@ -20,7 +20,7 @@ pub(super) struct Beside {
 }
 
 /// Limits in degrees: in radians where they say so, or none is beyond two turns. Those of joints that slide stay as they are.
-pub(super) fn in_deg(limits: &mut [Option<Limits>], slides: &[bool], stated: Option<Unit>) {
+fn in_deg(limits: &mut [Option<Limits>], slides: &[bool], stated: Option<Unit>) {
     let mut turning: Vec<&mut Limits> = limits
         .iter_mut()
         .zip(slides)

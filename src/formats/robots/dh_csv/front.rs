@@ -4,7 +4,6 @@ use std::borrow::Cow;
 
 use camino::Utf8Path;
 
-use super::beside;
 use super::names::{HINT, named};
 use super::reading::{Reading, reading};
 use super::table::Table;
@@ -198,22 +197,39 @@ fn above(grid: &Grid, given: Option<&[String]>, rows: &[(u64, Fields)]) -> Resul
 
 /// Links whose parameters a text names.
 fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Result<Reading> {
-    let values = || links.rows.iter().flat_map(|(_, row)| [row[0], row[2]]);
-    let unit = if values().any(|v| v.radians) { " [rad]" } else { "" };
-    let names = [format!("alpha{unit}"), "a".to_owned(), format!("theta{unit}"), "d".to_owned()];
+    let unit = |radians: bool| if radians { " [rad]" } else { "" };
+    let angles = unit(links.rows.iter().any(|(_, row)| row[0].radians || row[2].radians));
+    let mut limits = links.limits.iter().zip(&links.slides).filter(|(_, slides)| !**slides);
+    let limits = unit(limits.any(|(limits, _)| limits.iter().flatten().any(|v| v.radians)));
+    let names = [
+        format!("alpha{angles}"),
+        "a".to_owned(),
+        format!("theta{angles}"),
+        "d".to_owned(),
+        "sigma".to_owned(),
+        format!("min{limits}"),
+        format!("max{limits}"),
+    ];
     let cell = |v: &Value| if v.variable { format!("q + {}", v.number) } else { v.number.to_string() };
-    let rows: Vec<(u64, Fields)> =
-        links.rows.iter().map(|(line, row)| (*line, Fields::new(row.iter().map(cell)))).collect();
+    let row = |joint: usize| {
+        let (line, row) = &links.rows[joint];
+        let limits = links.limits[joint].map(|limits| limits.map(|v| v.number)).filter(|[low, high]| low < high);
+        let limits = limits.map_or([const { String::new() }; 2], |limits| limits.map(|v| v.to_string()));
+        let sigma = u8::from(links.slides[joint]).to_string();
+        (*line, Fields::new(row.iter().map(cell).chain([sigma]).chain(limits)))
+    };
+    let rows: Vec<(u64, Fields)> = (0..links.rows.len()).map(row).collect();
     let grid = Grid { rows: rows.clone(), ..empty(path) };
     let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
     let mut found = reading(&table, [0, 1, 2, 3])?;
     found.stated = links.convention;
     found.calls = links.calls;
-    let radians = links.limits.iter().flatten().flatten().any(|v| v.radians);
-    found.limits_deg = links.limits.iter().map(|limits| limits.map(|[low, high]| (low.number, high.number))).collect();
-    found.limits_deg.truncate(found.rows.len());
-    found.limits_deg.iter_mut().for_each(|limits| *limits = limits.filter(|(low, high)| low < high));
-    beside::in_deg(&mut found.limits_deg, &found.slides, radians.then_some(Unit::Rad));
+    found.contradiction = links.contradiction.clone();
+    found.flipped = links.flipped.clone();
+    let flipped: Vec<String> = (1..).zip(&links.flipped).filter(|(_, f)| **f).map(|(j, _)| j.to_string()).collect();
+    if !flipped.is_empty() {
+        found.said += &format!(", counted the other way (flip): {}", flipped.join(", "));
+    }
     if links.limited && found.limits_deg.iter().any(Option::is_none) {
         found.said.push_str(", left out: qlim");
     }

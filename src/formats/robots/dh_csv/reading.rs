@@ -8,6 +8,7 @@ use super::names::{NAMES, OWN, plain};
 use super::table::Table;
 use super::units::{Open, units};
 use crate::files::Result;
+use crate::formats::robots::dh_words::Words;
 use crate::geometry::Transform;
 use crate::robot::Robot;
 use crate::robot::catalogue::{Convention, Row, from_rows};
@@ -18,7 +19,7 @@ const PLAIN: &str = "neither twist nor length";
 const TWIST: &str = "a twist";
 
 /// A way to read a table.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Reading {
     /// In deg and mm.
     pub(super) rows: Vec<Row>,
@@ -29,14 +30,17 @@ pub struct Reading {
     /// Of joints that slide in mm.
     pub(super) limits_deg: Vec<Option<Limits>>,
     pub(super) slides: Vec<bool>,
+    /// Of joints that count the other way, where the table says it.
+    pub(super) flipped: Vec<bool>,
     /// What was taken, for a sentence.
     pub said: String,
     /// The columns' names in their order, as `--columns` has them.
     pub columns: String,
     /// The convention that names or calls say, and which.
     pub(super) stated: Option<(Convention, &'static str)>,
-    /// The convention that words say.
-    pub(super) words: Option<Convention>,
+    pub(super) words: Words,
+    /// How calls contradict each other about the convention.
+    pub(super) contradiction: Option<String>,
     /// Whether calls of a toolbox make its links.
     pub(super) calls: bool,
     /// Whether the names are this program's own, whose tables are modified ones.
@@ -57,6 +61,7 @@ impl Reading {
         for (joint, (limits, _)) in sliding.filter(|(_, (_, slides))| **slides) {
             (joint.slides, joint.limits_rad) = (true, *limits);
         }
+        robot.joints.iter_mut().zip(&self.flipped).filter(|(_, f)| **f).for_each(|(joint, _)| joint.sign = -1.0);
         if !self.flange.is_empty() {
             let held = from_rows(name, convention, &self.flange);
             let still = vec![0.0; self.flange.len()];
@@ -78,8 +83,10 @@ impl Reading {
             return (Some(Convention::Modified), "`beta_deg` stands beside alpha and a of a modified table".to_owned());
         }
         let (shown, ends) = self.shown();
-        match (self.stated, self.words, shown) {
+        match (self.stated, self.words.convention, shown) {
             (Some((stated, why)), ..) => (Some(stated), why.to_owned()),
+            _ if let Some(contradiction) = &self.contradiction => (None, contradiction.clone()),
+            _ if self.words.both => (None, "words of the file say both, modified and classic".to_owned()),
             (None, Some(said), Some(shown)) if said != shown => {
                 (None, format!("words of the file say {}, but {ends} as of the other", said.name()))
             }
@@ -141,14 +148,7 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     {
         (*low, *high) = (d.converted(*low), d.converted(*high));
     }
-    // `a(i-1)`, `alpha_{i-1}`: those of the link before.
-    let before = |name: &String| {
-        let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
-        ["i-1", "i\u{2212}1", "j-1", "n-1"].iter().any(|index| bare.contains(index))
-    };
-    let stated = names
-        .filter(|n| before(&n[columns[0]]) || before(&n[columns[1]]))
-        .map(|_| (Convention::Modified, "alpha and a are named as those of the link before"));
+    let stated = names.and_then(|names| of_link_before(names, columns));
     let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
     let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
     order.sort_unstable();
@@ -171,6 +171,17 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     if !left_out.is_empty() {
         let _ = write!(said, ", left out: {}", left_out.join(", "));
     }
-    let (words, open) = (table.words.convention, angles_open.or(lengths_open));
-    Ok(Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, stated, words, calls: false, own, open })
+    let (words, open) = (table.words, angles_open.or(lengths_open));
+    let found = Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, ..Reading::default() };
+    Ok(Reading { stated, words, own, open, ..found })
+}
+
+/// What `a(i-1)`, `alpha_{i-1}` say.
+fn of_link_before(names: &[String], columns: [usize; 4]) -> Option<(Convention, &'static str)> {
+    let before = |name: &String| {
+        let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
+        ["i-1", "i\u{2212}1", "j-1", "n-1"].iter().any(|index| bare.contains(index))
+    };
+    (before(&names[columns[0]]) || before(&names[columns[1]]))
+        .then_some((Convention::Modified, "alpha and a are named as those of the link before"))
 }

@@ -222,3 +222,41 @@ fn a_table_in_a_document_is_read_without_what_is_around_it() {
     let two = "alpha a theta d\n0 0.2 0 -0.2\npi/2 0 0 0\n\nLeft\n0 -0.2 0 -0.2\npi/2 0 0 0\n";
     assert!(said("leg.txt", two).contains("a second table of numbers begins here"));
 }
+
+#[test]
+fn words_that_contradict_each_other_are_asked_about() {
+    let links = "L(1) = Link('d', 0.3, 'alpha', pi/2);\nL(2) = Link('a', 0.4);\nL(3) = Link('a', 0.1);\n";
+    let of = |text: &str| one("dh.m", text).convention();
+    let (asked, why) = of(&format!("% standard DH; there is a modified DH version, too\n{links}"));
+    assert!(asked.is_none() && why.contains("both"), "{why}");
+    let flags = links.replace(");", ", 'modified');");
+    assert_eq!(of(&format!("% standard DH\n{flags}")).0, Some(Convention::Modified));
+    assert_eq!(of(&format!("% standard DH\n{links}")).0, Some(Convention::Classic));
+    assert_eq!(of(links).0, Some(Convention::Classic));
+    let (asked, why) = of(&links.replacen(");", ", 'modified');", 1));
+    assert!(asked.is_none() && why.contains("line 1"), "{why}");
+}
+
+#[test]
+fn joints_of_a_toolbox_slide_and_count_the_other_way() {
+    let text = "links = [\n Revolute('d', 0.4, 'alpha', pi/2, 'flip', 'qlim', [-50 60]*pi/180)\n Prismatic('qlim', [0 0.21])\n Revolute('a', 0.2)\n];\n";
+    let reading = one("arm.m", text);
+    assert!(reading.said.contains("sliding: 2") && reading.said.contains("(flip): 1"), "{}", reading.said);
+    let robot = reading.robot("arm", Convention::Classic);
+    let signs: Vec<f64> = robot.joints.iter().map(|joint| joint.sign).collect();
+    assert_eq!(signs, [-1.0, 1.0, 1.0]);
+    assert_eq!((robot.joints[1].slides, robot.joints[1].limits_rad), (true, Some((0.0, 210.0))));
+    let (low, high) = robot.joints[0].limits_rad.unwrap();
+    assert!((low.to_degrees() + 50.0).abs() < 1e-9 && (high.to_degrees() - 60.0).abs() < 1e-9);
+    // As the toolbox has it: A(q) = Rz(offset - q) Tz(d) Tx(a) Rx(alpha).
+    let at = robot.root_from_flange(&[0.3, 100.0, 0.0]) * nalgebra::Point3::origin();
+    let (radial, up) = (200.0, 400.0);
+    let expected = nalgebra::Point3::new(
+        radial * 0.3f64.cos() + 100.0 * (-0.3f64).sin(),
+        -radial * 0.3f64.sin() - 100.0 * 0.3f64.cos(),
+        up,
+    );
+    assert!((at - expected).norm() < 1e-9, "{at}");
+    let plain = one("arm.m", &text.replace(", 'flip'", ""));
+    assert!(!plain.said.contains("flip") && plain.robot("arm", Convention::Classic).joints[0].sign == 1.0);
+}

@@ -1,7 +1,7 @@
 //! A program's text without its comments, and its comments.
 
 /// Marks of the beginning and of the end of a comment over several lines, or of a text that is one.
-const BLOCKS: [(&str, &str); 3] = [("\"\"\"", "\"\"\""), ("'''", "'''"), ("/*", "*/")];
+const BLOCKS: [(&str, &str); 4] = [("\"\"\"", "\"\"\""), ("'''", "'''"), ("/*", "*/"), ("%{", "%}")];
 
 /// Where a comment begins that goes to the end of the line.
 pub(super) fn start(line: &str) -> usize {
@@ -26,10 +26,15 @@ pub(super) fn split(text: &str) -> (String, String) {
             }
             let comment = start(rest);
             let opened = |(open, close): &(&str, &'static str)| Some((rest.find(open)?, *close, open.len()));
-            // `path/*` opens none.
-            let blocks = BLOCKS.iter().filter(|(_, close)| *close != "*/" || text.contains(close));
+            // `path/*` opens none, and `%{` does alone on its line.
+            let opens = |(open, close): &&(&str, &str)| match *open {
+                "/*" => text.contains(close),
+                "%{" => rest.trim() == *open && text.contains(close),
+                _ => true,
+            };
+            let blocks = BLOCKS.iter().filter(opens);
             match blocks.filter_map(opened).min() {
-                Some((start, close, length)) if start < comment => {
+                Some((start, close, length)) if start <= comment => {
                     plain.push_str(&rest[..start]);
                     (rest, quoted) = (&rest[start + length..], Some(close));
                 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::robot::catalogue::Convention;
 use crate::tables::expression::Value;
 
 /// What names of a text stand for.
@@ -9,6 +10,10 @@ pub type Known = BTreeMap<String, Value>;
 
 /// A line and what is wrong there.
 pub type Wrong = (u64, String);
+
+/// Calls that make a link.
+pub(super) const CALLS: [&str; 8] =
+    ["RevoluteDH", "RevoluteMDH", "PrismaticDH", "PrismaticMDH", "DHLink", "Link", "Revolute", "Prismatic"];
 
 /// Names of the parameters, in the order of a row.
 pub(super) const KEYS: [&[&str]; 4] = [
@@ -25,13 +30,62 @@ pub(super) struct Link {
     /// Whether a call makes it, whose parameters may be left out.
     pub call: bool,
     pub values: [Option<Value>; 4],
-    /// The least and the largest angle.
+    /// What a call adds to the joint's own variable, theta or d.
+    pub offset: Option<Value>,
+    /// The least and the largest reading.
     pub limits: Option<[Value; 2]>,
+    pub slides: bool,
+    /// Whether the joint counts the other way.
+    pub flipped: bool,
+    /// The convention that its call says.
+    pub convention: Option<Convention>,
 }
 
 impl Link {
     /// One that has nothing yet.
     pub fn at(line: u64, depth: usize) -> Link {
-        Link { line, depth, call: false, values: [None; 4], limits: None }
+        Link {
+            line,
+            depth,
+            call: false,
+            values: [None; 4],
+            offset: None,
+            limits: None,
+            slides: false,
+            flipped: false,
+            convention: None,
+        }
+    }
+
+    /// Alpha, a, theta and d, zero where nothing says otherwise. What a call makes moves, whatever its theta says.
+    pub fn row(&self) -> Result<[Value; 4], Wrong> {
+        let none = Value { number: 0.0, radians: false, variable: false };
+        let value = |v: Option<Value>| v.map_or(none, |v| Value { variable: v.variable && !self.call, ..v });
+        let mut row = self.values.map(value);
+        if self.slides && row[3].number != 0.0 {
+            let message = format!(
+                "the joint slides, so that d is its reading, but d is {} beside it, which the toolbox leaves out: write it as `offset`, or leave it out",
+                row[3].number
+            );
+            return Err((self.line, message));
+        }
+        let own = &mut row[if self.slides { 3 } else { 2 }];
+        let offset = value(self.offset);
+        *own = Value { number: own.number + offset.number, radians: own.radians || offset.radians, ..*own };
+        Ok(row)
+    }
+}
+
+/// The convention that the calls of links say, those that say nothing being classic beside others; where they contradict each other, how.
+pub(super) fn convention(links: &[Link]) -> Result<Option<Convention>, String> {
+    let calls = || links.iter().filter(|link| link.call);
+    let is_modified = |link: &&Link| link.convention == Some(Convention::Modified);
+    match (calls().find(is_modified), calls().find(|link| !is_modified(link))) {
+        (Some(modified), Some(other)) => Err(format!(
+            "the link of line {} is made as a modified one and that of line {} as a classic one",
+            modified.line, other.line
+        )),
+        (Some(_), None) => Ok(Some(Convention::Modified)),
+        (None, _) => Ok(calls().find_map(|link| link.convention)),
     }
 }

@@ -79,11 +79,12 @@ fn a_table_in_brackets_has_its_order_in_a_comment() {
 fn what_a_table_has_no_place_for_is_refused_with_its_line() {
     let wrong = |text: &str| read(text, false).unwrap_err();
     let two = "RevoluteDH(d=0.3, alpha=pi/2)\n";
-    assert_eq!(wrong(&format!("{two}PrismaticDH(a=0.2)\n")).0, 2);
+    let slides = "x: {a: 0, d: 1, alpha: 2, type: 'prismatic'}\ny: {a: 0, d: 1, alpha: 2}\n";
+    assert!(wrong(&format!("\n{slides}")) == (2, SLIDES.to_owned()));
     assert!(wrong(&format!("{two}RevoluteDH(d=d2, a=0.2)\n")).1.contains("`d2`"));
-    assert!(wrong(&format!("{two}RevoluteDH(d=0.1, flip=True)\n")).1.contains("flip"));
+    assert!(wrong(&format!("{two}RevoluteDH(d=f(1), a=0.2)\n")).1.contains("sqrt are followed"));
     assert!(wrong(&format!("{two}RevoluteDH(0.1, 0.2, 0.3)\n")).1.contains("without names"));
-    assert!(wrong("L(1) = Link([0 0.3 0 0 1]);\n").1.contains("slides"));
+    assert!(wrong("L(1) = Link([0 0.3 0 0 1]);\nL(2) = Link([0 0 0 0]);\n").1.contains("slides"));
     assert!(wrong("a = [0, 1]\nd = [0, 1, 2]\nalpha = [0, 0]\n").1.contains("different lengths"));
     assert!(wrong("x: {a: 0, d: 1}\ny: {a: 0, d: 1, alpha: 2}\n").1.contains("other parameters"));
     // A link that names nothing is one, too.
@@ -146,4 +147,69 @@ fn tables_beside_the_longest_are_named_by_their_lines() {
         let matrix = table(&text).unwrap().unwrap();
         assert_eq!((matrix.rows.len(), &matrix.others), (7, &others), "{text}");
     }
+}
+
+/// Two arms of three joints, links in the calls that make the robots.
+const TWO: &str = "deg = pi/180;\nleft = SerialLink( [\n Revolute('d', 0.1, 'alpha', -pi/2, 'modified')\n Revolute('a', 0.2, 'modified')\n Revolute('a', 0.3, 'modified')\n ], ...\n 'base', transl(0, 0.1, 0), 'name', 'left arm');\nright = SerialLink( [\n Revolute('d', -0.1, 'modified')\n Revolute('a', 0.2, 'modified')\n Revolute('a', 0.3, 'modified')\n ], 'base', transl(0, 0.1, 0));\n";
+
+#[test]
+fn links_of_several_robots_are_not_those_of_one() {
+    let links = "L(1) = Link([0 0.3 0 pi/2]);\nL(2) = Link([0 0 0.4 0]);\n";
+    let again = links.replace("L(", "M(");
+    let python = "class A(DHRobot):\n def __init__(self):\n  links = [RevoluteDH(d=1), RevoluteDH(a=2)]\n  super().__init__(links, name=\"A\")\n";
+    for (several, names) in [
+        (TWO.to_owned(), "2 robots (left arm, line 2; right, line 8)"),
+        (format!("{links}r = SerialLink(L);\n{links}s = SerialLink(L, 'name', 'S 2');\n"), "(r, line 3; S 2, line 6)"),
+        (format!("{links}{again}r = SerialLink(L);\ns = SerialLink(M);\n"), "(r, line 5; s, line 6)"),
+        (format!("{python}{}", python.replace('A', "B")), "(A, line 4; B, line 8)"),
+    ] {
+        let (_, message) = read(&several, false).unwrap_err();
+        assert!(message.contains(names) && message.contains("leave the links of one"), "{message}");
+    }
+    for one in [
+        TWO.split("right =").next().unwrap().to_owned(),
+        format!("{links}r = SerialLink(L, 'name', 'left');\ns = SerialLink(L, 'name', 'right');\n"),
+        format!("{links}r = SerialLink(L);\ns = SerialLink(r, 'name', 'with a tool');\n"),
+        format!("from rtb import DHRobot\n{python}\nif __name__ == '__main__':\n robot = A()\n"),
+        links.to_owned(),
+    ] {
+        assert_eq!(read(&one, false).unwrap().links.map(|l| l.rows.len() < 4), Some(true), "{one}");
+    }
+}
+
+#[test]
+fn what_calls_say_of_the_convention_comes_before_comments() {
+    let of = |text: &str| read(text, false).unwrap().links.map(|l| (l.convention.map(|(c, _)| c), l.contradiction));
+    let one = TWO.split("right =").next().unwrap();
+    for comment in ["", "% MODEL: humanoid, standard_DH\n"] {
+        assert_eq!(of(&format!("{comment}{one}")), Some((Some(Convention::Modified), None)), "{comment}");
+    }
+    let standard = one.replace("modified", "standard");
+    assert_eq!(of(&format!("% modified DH\n{standard}")), Some((Some(Convention::Classic), None)));
+    assert_eq!(of(&standard.replacen(", 'standard'", "", 2)), Some((Some(Convention::Classic), None)));
+    assert_eq!(of(&one.replace(", 'modified'", "")), Some((None, None)));
+    for mixed in [one.replacen(", 'modified'", "", 1), "[RevoluteMDH(d=1), RevoluteDH(a=1)]\n".to_owned()] {
+        let (convention, contradiction) = of(&mixed).unwrap();
+        assert!(convention.is_none() && contradiction.is_some_and(|said| said.contains("classic")), "{mixed}");
+    }
+}
+
+#[test]
+fn links_of_calls_slide_count_the_other_way_and_follow_formulas() {
+    let links = |text: &str| read(text, false).unwrap().links.unwrap();
+    let arm = "aa = 30*pi/180; sa = sin(aa); s2a = sin(2*aa);\nD3 = 0.2; d4b = D3 + sa/s2a*0.1;\nlinks = [\n Revolute('alpha', 2*aa, 'd', -d4b, 'flip')\n Prismatic('theta', pi/2, 'a', 0.3, 'offset', 0.01, 'qlim', [0 0.21])\n Revolute('offset', pi/2, 'r', RC(1,:), 'm', M(1))\n ];\n%{\nlinks = [\n Revolute('a', 0.7, 'modified')\n ];\n%}\n";
+    let found = links(arm);
+    let rows: Vec<Row> = found.rows.iter().map(|(_, row)| row.map(|v| v.number)).collect();
+    let d4b = 0.2 + 0.1 * (PI / 6.0).sin() / (PI / 3.0).sin();
+    assert!(
+        close(&rows, &[[PI / 3.0, 0.0, 0.0, -d4b], [0.0, 0.3, PI / 2.0, 0.01], [0.0, 0.0, PI / 2.0, 0.0]]),
+        "{rows:?}"
+    );
+    assert_eq!((found.slides, found.flipped), (vec![false, true, false], vec![true, false, false]));
+    assert_eq!(found.limits[1].map(|limits| limits.map(|v| v.number)), Some([0.0, 0.21]));
+    let python =
+        links("[RevoluteDH(d=1, flip=True), PrismaticDH(theta=1), RevoluteDH(a=1, r=[1, 2, 3], flip=False)]\n");
+    assert_eq!((python.slides, python.flipped), (vec![false, true, false], vec![true, false, false]));
+    let vectors = links("L(1) = Link([0 0.4 0 -pi/2 0]);\nL(2) = Link([-pi/2 0 0 0 1]);\nL(3) = Link('sigma', 1);\n");
+    assert_eq!((vectors.slides, vectors.flipped), (vec![false, true, true], vec![false; 3]));
 }

@@ -1,6 +1,8 @@
 //! The new rows at the old robot: residuals that no placement reaches, what they are known to, and the columns of what may have changed.
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, Vector3};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, SymmetricEigen, Vector3};
 
 use super::found::Before;
 use super::suspects::Suspect;
@@ -49,10 +51,41 @@ impl Compared<'_> {
         let linear = Linearised::new(self.rows, &self.offsets(of_robot));
         let (off, columns) = left_over(&linear, self.count);
         let known: Vec<usize> = (0..self.before.parameters.len()).collect();
-        let of_old = columns.select_columns(&known);
-        let joint = DMatrix::identity(off.len(), off.len()) + &of_old * &self.before.covariance * of_old.transpose();
-        let difference = Difference::new(off, &joint, self.before.poses, 1.0)?;
+        let of_old = columns.select_columns(&known) * root(&self.before.covariance);
+        let difference = Difference::of_white(off, of_old, self.before.poses)?;
         Some((linear, Look { difference, columns }))
+    }
+
+    /// By how much the squared residuals of each row, by its index in the set, shrink those of all where the row is left out: as if its residuals
+    /// were free. Exact where all is linear.
+    pub(super) fn gains(&self) -> Vec<(usize, f64)> {
+        let linear = Linearised::new(self.rows, &self.offsets(&vec![0.0; self.count]));
+        let (nuisance, all) = stacked(&linear, self.count);
+        // What placements and turns take up, and of the rest what the old robot is uncertain by.
+        let taken = nuisance.qr().q();
+        let rest = &all - &taken * product(&taken, &all);
+        let uncertain = rest.columns(1, self.before.parameters.len()) * root(&self.before.covariance);
+        let size = uncertain.ncols();
+        let inner = (DMatrix::identity(size, size) + product(&uncertain, &uncertain)).try_inverse();
+        let Some(weighted) = inner.map(|inner| &uncertain * inner) else { return Vec::new() };
+        let off = rest.column(0).into_owned();
+        let pull = &off - &weighted * uncertain.tr_mul(&off);
+        let gain = |at: Range<usize>| {
+            let of = |columns: &DMatrix<f64>| columns.rows(at.start, at.len()).into_owned();
+            let (own, pull) = (of(&taken), pull.rows(at.start, at.len()).into_owned());
+            let left = DMatrix::identity(at.len(), at.len())
+                - &own * own.transpose()
+                - of(&weighted) * of(&uncertain).transpose();
+            pull.dot(&(pseudo_inverse(left) * &pull))
+        };
+        let mut start = 0;
+        let mut gains = Vec::new();
+        for placement in &linear.placements {
+            let of_pose = placement.by_pose().map(|(pose, at)| (pose, start + at.start..start + at.end));
+            gains.extend(of_pose.map(|(pose, at)| (self.rows.rows[pose], gain(at))));
+            start += placement.poses.len();
+        }
+        gains
     }
 
     /// The largest residual of a point at the old robot, mm.
@@ -126,8 +159,18 @@ fn places(set: &Dataset, robot: &Robot) -> Vec<Matrix3xX<f64>> {
     set.poses.iter().map(of_pose).collect()
 }
 
-/// White residuals and the columns of the first so many offsets, in coordinates that the placements and the target's turn do not reach.
-fn left_over(linear: &Linearised, count: usize) -> (DVector<f64>, DMatrix<f64>) {
+/// A matrix whose product with itself transposed is this covariance, which its file may hold with rounded digits.
+fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let SymmetricEigen { mut eigenvectors, eigenvalues } =
+        (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+    for (mut vector, value) in eigenvectors.column_iter_mut().zip(eigenvalues.iter()) {
+        vector *= value.max(0.0).sqrt();
+    }
+    eigenvectors
+}
+
+/// White residuals with the columns of the first so many offsets, behind the columns of the target's turn and the placements.
+fn stacked(linear: &Linearised, count: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let total: usize = linear.placements.iter().map(|p| p.linear.residuals.len()).sum();
     let turns = linear.shared - count;
     let mut nuisance = DMatrix::zeros(total, turns + 6 * linear.placements.len());
@@ -142,6 +185,13 @@ fn left_over(linear: &Linearised, count: usize) -> (DVector<f64>, DMatrix<f64>) 
         all.view_mut((row, 1), (rows, count)).copy_from(&part.jacobian.columns(0, count));
         row += rows;
     }
+    (nuisance, all)
+}
+
+/// White residuals and the columns of the first so many offsets, in coordinates that the placements and the target's turn do not reach.
+fn left_over(linear: &Linearised, count: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let (nuisance, mut all) = stacked(linear, count);
+    let total = all.nrows();
     let taken = nuisance.ncols();
     nuisance.qr().q_tr_mul(&mut all);
     let rest = all.rows(taken, total.saturating_sub(taken)).into_owned();

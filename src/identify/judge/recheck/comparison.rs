@@ -50,6 +50,11 @@ impl Comparison<'_> {
         self.compared(used, |compared| Some(compared.at(&vec![0.0; compared.count])?.1))
     }
 
+    /// By how much leaving out each of these rows would shrink what they leave.
+    pub(super) fn gains(&self, used: &[usize]) -> Vec<(usize, f64)> {
+        self.compared(used, |compared| compared.gains())
+    }
+
     pub(super) fn said(&self, used: &[usize]) -> Result<Said, Error> {
         let undetermined = || Error::NothingDetermined { poses: used.len() };
         self.compared(used, |compared| self.of(compared, used)).ok_or_else(undetermined)

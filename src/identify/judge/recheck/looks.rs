@@ -106,12 +106,14 @@ impl<'a> Looks<'a> {
     fn left_by(&self, suspect: &Suspect) -> Option<(f64, Difference, Vec<f64>)> {
         let mut offsets = vec![0.0; self.look.columns.ncols()];
         let mut total = DVector::zeros(suspect.columns.len());
-        let mut look = (self.again)(&offsets)?;
+        let mut again = None;
         for _ in 0..ROUNDS {
+            let look = again.as_ref().unwrap_or(&self.look);
             total += look.amounts(&look.directions(suspect));
             suspect.columns.iter().zip(total.iter()).for_each(|(&(at, unit), amount)| offsets[at] = unit * amount);
-            look = (self.again)(&offsets)?;
+            again = Some((self.again)(&offsets)?);
         }
+        let look = again?;
         let left = look.difference.left_by(&look.directions(suspect))?;
         Some((left, look.difference, total.iter().copied().collect()))
     }

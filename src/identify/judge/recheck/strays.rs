@@ -14,6 +14,9 @@ use crate::identify::judge::locate::FEWEST_POSES;
 /// One row in so many may be a stray.
 const SHARE: usize = 5;
 
+/// Rows of which each is left out in turn: more than a check of some ten poses has.
+const LOOKED_AT: usize = 16;
+
 /// What the rows say without the strays among them; `None` where there are none.
 pub(super) fn left_out(comparison: &Comparison, used: &[usize], whole: &Said) -> Option<Recheck> {
     if !whole.recheck.changed {
@@ -67,13 +70,21 @@ fn only_strays(comparison: &Comparison, mut rest: Vec<usize>, mut strays: Vec<us
     Recheck { strays: comparison.set.names(&strays), ..recheck }
 }
 
-/// The row whose absence leaves the least squared residuals, and how much.
+/// The row whose absence leaves the least squared residuals, and how much. Of many rows, those that do so where all is linear are looked at alone.
 fn farthest(comparison: &Comparison, rows: &[usize]) -> Option<(f64, usize)> {
     let group = |row: usize| comparison.set.poses[row].group;
-    let is_spare = |&&row: &&usize| rows.iter().filter(|&&other| group(other) == group(row)).count() > FEWEST_POSES;
-    let left = |&row: &usize| {
+    let is_spare = |row: &usize| rows.iter().filter(|&&other| group(other) == group(*row)).count() > FEWEST_POSES;
+    let mut spare: Vec<usize> = rows.iter().copied().filter(is_spare).collect();
+    if spare.len() > LOOKED_AT {
+        let mut gains = comparison.gains(rows);
+        gains.retain(|(row, _)| spare.contains(row));
+        gains.sort_by(|a, b| b.1.total_cmp(&a.1));
+        spare = gains.into_iter().take(LOOKED_AT).map(|(row, _)| row).collect();
+        spare.sort_unstable();
+    }
+    let left = |row: usize| {
         let others: Vec<usize> = rows.iter().copied().filter(|&other| other != row).collect();
         Some((comparison.look(&others)?.difference.chi_square(), row))
     };
-    rows.iter().filter(is_spare).filter_map(left).min_by(|a, b| a.0.total_cmp(&b.0))
+    spare.into_iter().filter_map(left).min_by(|a, b| a.0.total_cmp(&b.0))
 }

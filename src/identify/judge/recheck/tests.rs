@@ -244,3 +244,30 @@ fn what_the_placement_takes_up_is_not_named_as_a_cause() {
         }
     }
 }
+
+/// What a row that is left out takes with it follows from its leverage; of many rows the misread ones are found by it.
+#[test]
+fn misread_rows_among_many_are_those_whose_absence_leaves_least() {
+    for oriented in [false, true] {
+        let cell = cell(oriented, 4);
+        let mut rows = cell.rows(&|_| {}, 40, 31);
+        let clean = Dataset::new(&rows).unwrap();
+        assert!(recheck(&clean, &cell.found, &cell.before, &|_| None).unwrap().strays.is_empty());
+        for (row, off_mm) in [(7, 2.0), (23, -1.0)] {
+            synthetic::point(&mut rows[row]).x += off_mm;
+        }
+        let set = Dataset::new(&rows).unwrap();
+        let found = recheck(&set, &cell.found, &cell.before, &|_| None).unwrap();
+        assert!(!found.changed && found.strays == set.names(&[7, 23]), "{:?}", found.strays);
+        let used = set.placing_rows(FEWEST_POSES).unwrap();
+        let (robot, before) = (&cell.found, &cell.before);
+        let parameters = before.parameters.clone();
+        let comparison = Comparison { set: &set, robot, before, stood: &|_| None, parameters, oriented };
+        let left = |rows: &[usize]| comparison.look(rows).unwrap().difference.chi_square();
+        for (row, gain) in comparison.gains(&used) {
+            let others: Vec<usize> = used.iter().copied().filter(|&other| other != row).collect();
+            let expected = left(&used) - left(&others);
+            assert!((gain - expected).abs() < 0.05 * expected + 0.1, "row {row}: {gain} for {expected}");
+        }
+    }
+}

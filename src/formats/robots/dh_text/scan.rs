@@ -1,0 +1,185 @@
+//! What stands in a text one behind the other: parameters with their values, links, lists, and numbers that get names.
+//!
+//! In: code without comments. Out: what the links are made from. What goes wrong: a value that is no number, and a joint that slides where only a call
+//! of a toolbox says it.
+
+use std::collections::BTreeMap;
+
+use super::link::{CALLS, KEYS, Known, Link, Wrong};
+use super::lists::{self, Lists, extent, list};
+use super::numbered;
+use crate::tables::expression::{Value, evaluate};
+
+#[derive(Default)]
+pub(super) struct Scan<'a> {
+    pub(super) text: &'a str,
+    pub(super) at: usize,
+    pub(super) depth: usize,
+    pub(super) line: u64,
+    /// Names that the text has set to numbers.
+    pub(super) known: Known,
+    pub(super) links: Vec<Link>,
+    pub(super) lists: Lists,
+    /// Lists whose names have the same before the parameter's.
+    pub(super) families: BTreeMap<String, Lists>,
+    pub(super) numbered: numbered::Numbered,
+    /// The first value that is no number.
+    pub(super) wrong: Option<Wrong>,
+}
+
+impl Scan<'_> {
+    pub(super) fn run(&mut self) -> Result<(), Wrong> {
+        let mut before = '\n';
+        while let Some(c) = self.text[self.at..].chars().next() {
+            let starts = (c.is_alphabetic() || c == '_') && !(before.is_alphanumeric() || matches!(before, '_' | '.'));
+            if starts {
+                let rest = &self.text[self.at..];
+                let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+                self.word(end)?;
+                before = 'a';
+                continue;
+            }
+            match c {
+                '(' | '[' | '{' => self.depth += 1,
+                ')' | ']' | '}' => {
+                    self.depth = self.depth.saturating_sub(1);
+                    self.close(self.depth + 1);
+                }
+                '\n' => {
+                    self.line += 1;
+                    if self.depth == 0 && self.text[self.at + 1..].trim_start_matches(' ').starts_with("- ") {
+                        self.close(0);
+                    }
+                }
+                _ => {}
+            }
+            before = c;
+            self.at += c.len_utf8();
+        }
+        Ok(())
+    }
+
+    /// A link as deep as that, or deeper, takes nothing more.
+    fn close(&mut self, depth: usize) {
+        if let Some(link) = self.links.last_mut().filter(|link| link.depth >= depth) {
+            link.depth = usize::MAX;
+        }
+    }
+
+    pub(super) fn evaluate(&self, text: &str) -> Option<Value> {
+        evaluate(text, &|name| self.known.get(name).copied())
+    }
+
+    /// A name of so many bytes: a call, a parameter with its value, or a number that gets a name.
+    fn word(&mut self, end: usize) -> Result<(), Wrong> {
+        let start = self.at;
+        let word = &self.text[start..start + end];
+        self.at += end;
+        let rest = &self.text[self.at..];
+        if CALLS.contains(&word) && rest.trim_start_matches(' ').starts_with('(') {
+            return self.call(word, start);
+        }
+        let quote = rest.chars().next().filter(|c| matches!(c, '\'' | '"'));
+        if quote.is_some() && self.flag(word) {
+            return Ok(());
+        }
+        let behind = rest[quote.map_or(0, char::len_utf8)..].trim_start_matches([' ', '\t']);
+        let behind = sized(behind).unwrap_or(behind);
+        let separator = behind.chars().next().filter(|c| matches!(c, '=' | ':') || *c == ',' && quote.is_some());
+        let Some(separator) = separator else { return Ok(()) };
+        let value = &behind[separator.len_utf8()..];
+        if value.starts_with('=') {
+            return Ok(());
+        }
+        let value_at = self.text.len() - value.len();
+        if self.of_call(word, value) {
+            self.at = value_at + extent(value);
+            return Ok(());
+        }
+        let which = KEYS.iter().position(|names| names.contains(&word.to_lowercase().as_str()));
+        if let Some(which) = which {
+            if let Some(list) = list(value, &self.known) {
+                self.lists[which].get_or_insert((self.line, list));
+                return Ok(());
+            }
+            let text = &value[..extent(value)];
+            match self.evaluate(text) {
+                Some(v) if !v.variable || which == 2 => {
+                    self.put(which, v);
+                    self.at = value_at + text.len();
+                }
+                Some(_) if self.depth > 0 => {
+                    return Err((self.line, format!("`{}`: a joint that slides", text.trim())));
+                }
+                None if self.depth > 0 && !text.trim().is_empty() => {
+                    let wrong = format!(
+                        "`{word}` is `{}`, which is no number: names that the file sets to numbers above, + - * /, sin, cos, tan and sqrt are followed",
+                        text.trim()
+                    );
+                    self.wrong.get_or_insert((self.line, wrong));
+                }
+                _ => {}
+            }
+        } else if let Some((which, number)) = numbered::parameter(word)
+            && let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2)
+        {
+            self.numbered[which].entry(number).or_insert((self.line, v));
+        }
+        self.other(word, value);
+        if separator == '=' && self.depth == 0 {
+            self.assign(start, word.to_owned(), value);
+        }
+        Ok(())
+    }
+
+    /// What else a name with a value may be: a list of a family, a link's limits.
+    fn other(&mut self, word: &str, value: &str) {
+        if let Some((family, which)) = lists::affixed(word)
+            && let Some(list) = list(value, &self.known)
+        {
+            self.families.entry(family).or_default()[which].get_or_insert((self.line, list));
+        }
+        if word == "qlim"
+            && let Some([low, high]) = list(value, &self.known).as_deref()
+            && let Some(link) = self.links.last_mut().filter(|link| link.depth == self.depth)
+        {
+            link.limits = Some([*low, *high]);
+        }
+    }
+
+    /// Numbers that get names, `a1, a2 = 0.4, 0.3` too.
+    fn assign(&mut self, start: usize, last: String, value: &str) {
+        let before = self.text[..start].rsplit(['\n', ';']).next().unwrap_or("");
+        let mut names: Vec<String> = before.split(',').map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect();
+        names.push(last);
+        let mut rest = value;
+        for name in names {
+            let text = &rest[..extent(rest)];
+            if let Some(v) = self.evaluate(text).filter(|v| !v.variable) {
+                self.known.insert(name, v);
+            }
+            rest = rest[text.len()..].strip_prefix(',').unwrap_or("");
+        }
+    }
+
+    fn put(&mut self, which: usize, value: Value) {
+        let (depth, line) = (self.depth, self.line);
+        let open = self.links.last_mut().filter(|link| link.depth == depth && link.values[which].is_none());
+        match open {
+            Some(link) => link.values[which] = Some(value),
+            None => {
+                let mut link = Link::at(line, depth);
+                link.values[which] = Some(value);
+                self.links.push(link);
+            }
+        }
+    }
+}
+
+/// What is behind the size of an array that a list follows, `[6] = {0, 1}`.
+fn sized(behind: &str) -> Option<&str> {
+    let (size, rest) = behind.strip_prefix('[')?.split_once(']')?;
+    let rest = rest.trim_start();
+    let listed = rest.strip_prefix('=')?.trim_start().starts_with(['{', '[']);
+    (size.trim().chars().all(|c| c.is_alphanumeric() || c == '_') && listed).then_some(rest)
+}
