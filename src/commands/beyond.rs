@@ -5,7 +5,7 @@ use camino::Utf8Path;
 use crate::diagnostic::count;
 use crate::formats::robots::known;
 use crate::identify::data::dataset::Dataset;
-use crate::robot::Robot;
+use crate::robot::{Joint, Robot};
 
 /// Share of a joint's range that rows may be outside of it, as new poses drawn like the old ones are.
 const USUAL: f64 = 0.1;
@@ -44,21 +44,24 @@ pub(super) fn outside(file: &Utf8Path, robot: &Robot, set: &Dataset, rows: &[usi
     let readings: Vec<&[f64]> = rows.iter().map(|&row| set.poses[row].joints_rad.as_slice()).collect();
     let joints = joints_outside(&ranges, robot, &readings, "row");
     let is_outside = |row: &usize| {
-        let of_joints = ranges.iter().zip(&set.poses[*row].joints_rad);
-        of_joints.into_iter().any(|(range, q)| off(*range, *q).is_some())
+        let of_joints = robot.joints.iter().zip(&ranges).zip(&set.poses[*row].joints_rad);
+        of_joints.into_iter().any(|((joint, range), q)| off(joint, *range, *q).is_some())
     };
     Outside { joints, rows: rows.iter().copied().filter(is_outside).collect() }
 }
 
-/// By how much a reading is outside of a range by more than new ones are that are drawn like the old ones.
-fn off((low, high): (f64, f64), q: f64) -> Option<f64> {
-    Some((low - q).max(q - high)).filter(|off| *off > USUAL * (high - low))
+/// By how much a joint's reading is outside of its range by more than new ones are that are drawn like the old ones; a joint that stood still comes
+/// back to half a degree (half a mm).
+fn off(joint: &Joint, (low, high): (f64, f64), q: f64) -> Option<f64> {
+    let same = if joint.slides { 0.5 } else { 0.5f64.to_radians() };
+    Some((low - q).max(q - high)).filter(|off| *off > same.max(USUAL * (high - low)))
 }
 
 /// The joints, from 0, outside of whose ranges many of these readings, rad (mm), are, and what is said of them; a `noun` is what has readings.
 fn joints_outside(ranges: &[(f64, f64)], robot: &Robot, readings: &[&[f64]], noun: &str) -> Vec<(usize, String)> {
     let of_joint = |joint: usize| {
-        let outside: Vec<f64> = readings.iter().filter_map(|q| off(ranges[joint], q[joint])).collect();
+        let outside: Vec<f64> =
+            readings.iter().filter_map(|q| off(&robot.joints[joint], ranges[joint], q[joint])).collect();
         let most = outside.iter().copied().fold(0.0, f64::max);
         let (unit, name) = if robot.joints[joint].slides { (1.0, "mm") } else { (1f64.to_degrees(), "deg") };
         (outside.len() * MANY >= readings.len() && most > 0.0).then(|| {
@@ -78,7 +81,8 @@ pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Op
     let joints = joints_outside(&ranges, robot, readings, "target");
     let is_far = |&(joint, _): &(usize, String)| {
         let (low, high) = ranges[joint];
-        joint > 0 && readings.iter().any(|q| off((low, high), q[joint]).is_some_and(|off| off > high - low))
+        let is_far = |q: &&[f64]| off(&robot.joints[joint], (low, high), q[joint]).is_some_and(|off| off > high - low);
+        joint > 0 && readings.iter().any(is_far)
     };
     let far = joints.iter().any(is_far);
     let said: Vec<String> = joints.into_iter().map(|(_, said)| said).collect();
@@ -93,4 +97,22 @@ pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Op
             far,
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_joint_that_stood_still_comes_back_to_half_a_degree() {
+        let turning = Joint::default();
+        let sliding = Joint { slides: true, ..turning };
+        let deg = 1f64.to_radians();
+        assert_eq!(off(&turning, (0.2, 0.2), 0.2 + 0.3 * deg), None);
+        assert!(off(&turning, (0.2, 0.2), 0.2 - 0.7 * deg).is_some_and(|by| (by - 0.7 * deg).abs() < 1e-12));
+        assert_eq!((off(&sliding, (3.0, 3.0), 3.4), off(&sliding, (3.0, 3.0), 4.0)), (None, Some(1.0)));
+        // A tenth of a wide range.
+        assert_eq!((off(&turning, (-1.0, 1.0), 1.15), off(&turning, (-1.0, 1.0), 0.3)), (None, None));
+        assert!(off(&turning, (-1.0, 1.0), 1.3).is_some());
+    }
 }
