@@ -11,7 +11,7 @@ use super::heed::{RigDoubts, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Measure;
 use crate::config::Config;
-use crate::diagnostic::count;
+use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::calibration::{self, Calibrated};
@@ -77,6 +77,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "measure.html", page)?;
     end(&series, &known, &out)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
+    let status = if series.judgement.leaves_open(known.tolerance_mm) { Status::OutOfTolerance } else { status };
     Ok(Outcome { stdout, status })
 }
 

@@ -59,7 +59,11 @@ impl Findings {
             .chain(unexplained)
             .chain(plausible::of_another_robot(found))
             .collect();
-        let notes = of_fit.into_iter().filter(|finding| !against.contains(finding)).collect();
+        // What is said against the result of some rows need not be said of them twice.
+        let is_told = |finding: &Finding| {
+            against.iter().any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
+        };
+        let notes = of_fit.into_iter().filter(|finding| !is_told(finding)).collect();
         // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
         // says nothing.
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {

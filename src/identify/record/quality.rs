@@ -65,10 +65,10 @@ pub fn quality(
     let of_targets = |extra: &Extra| matches!(extra, Extra::Target(_)) || set.are_on_flange();
     let extras: Vec<(Extra, f64)> = found.extras.iter().copied().filter(|(extra, _)| of_targets(extra)).collect();
     let judge = Judge { extras: &extras, ..Judge::plain(set, &found.fitted, settings.wire_offset) };
-    let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted));
+    let (fit, verify) = (judge.errors(robot, &found.fitted), found.held_out_errors(&judge, robot, fitted, &[]));
     let strays = found.strays(set);
     let without_strays = || {
-        let errors: Vec<RowError> = verify.iter().filter(|error| !strays.contains(&error.row)).cloned().collect();
+        let errors = found.held_out_errors(&judge, robot, fitted, strays);
         let rows: Vec<usize> = found.judged_rows(set).into_iter().filter(|row| !strays.contains(row)).collect();
         spread(&judge, robot, &errors, &rows)
     };

@@ -45,10 +45,13 @@ impl Identification {
     }
 
     /// Errors of a robot on rows that took no part in its fit: the rows to verify, or every row in the fits that it was left out of. A robot
-    /// that was `fitted` changes as the chosen one does where rows are left out; the nominal one does not. `judge` is for all fitted rows.
-    pub fn held_out_errors(&self, judge: &Judge, robot: &Robot, fitted: bool) -> Vec<RowError> {
+    /// that was `fitted` changes as the chosen one does where rows are left out; the nominal one does not. `judge` is for all fitted rows; rows to
+    /// verify that are `strays` are in no error, not even by the place that the others are judged from.
+    pub fn held_out_errors(&self, judge: &Judge, robot: &Robot, fitted: bool, strays: &[usize]) -> Vec<RowError> {
         if self.deletions.is_empty() {
-            return judge.errors(robot, &judge.set.verify_rows());
+            let mut rows = judge.set.verify_rows();
+            rows.retain(|row| !strays.contains(row));
+            return judge.errors(robot, &rows);
         }
         let part = |Deletion { rows, change }: &Deletion| {
             if !fitted {
@@ -73,11 +76,8 @@ impl Identification {
             return Against::NotWorse;
         }
         let judge = Judge { extras: &self.extras, ..Judge::plain(set, &self.fitted, settings.wire_offset) };
-        let [chosen, before] = [(self.robot(), true), (nominal, false)].map(|(robot, fitted)| {
-            let mut errors = self.held_out_errors(&judge, robot, fitted);
-            errors.retain(|e| !self.verify_outliers.contains(&e.row));
-            errors
-        });
+        let [chosen, before] = [(self.robot(), true), (nominal, false)]
+            .map(|(robot, fitted)| self.held_out_errors(&judge, robot, fitted, &self.verify_outliers));
         let points = chosen.iter().any(|e| e.point_mm.is_some());
         let size = |e: &RowError| match points {
             true => e.score(&self.scatter),

@@ -199,7 +199,12 @@ impl<'a> Run<'a> {
         });
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed { explanations: vec![explanation], moves_mm, beyond: f64::INFINITY }))
+        Some(Judgement::Contradicts(Changed {
+            explanations: vec![explanation],
+            moves_mm,
+            beyond: f64::INFINITY,
+            scaled_mm: None,
+        }))
     }
 
     /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.

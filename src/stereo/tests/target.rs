@@ -86,6 +86,23 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
     assert!(judged(&exchanged, 10.0).contains("exchanged"));
 }
 
+#[test]
+fn a_rig_that_is_scaled_is_not_taken_for_a_larger_target() {
+    // The target's print is a little higher than wide, which a free size of its squares takes up better than a rig does.
+    let mut world = World { sigma_px: 0.004, ..World::new(14, 37) };
+    world.board = Board { stretch: 1.0003, ..Board::checker("7x6".parse().unwrap(), 10.0) };
+    let corners = world.corners(38);
+    let said = Board { stretch: 1.0, ..world.board };
+    for share in [0.0, 0.003, 0.01] {
+        let mut rig = world.rig.clone();
+        rig.right_from_left.translation.vector *= 1.0 + share;
+        let Knowledge { tolerance_mm, .. } = known(&rig, said);
+        let judgement = series::measure(&known(&rig, said), run_of(corners.clone())).judgement;
+        let is_told = judgement.ends_the_run() || judgement.leaves_open(tolerance_mm);
+        assert_eq!(is_told, share > 0.0, "{share}: {judgement:?}");
+    }
+}
+
 /// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one that does much more is named.
 #[test]
 fn the_pairs_of_a_calibration_are_measured_by_it() {

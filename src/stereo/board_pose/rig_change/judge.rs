@@ -8,6 +8,7 @@
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use crate::geometry::Transform;
 use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, shifts_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
@@ -45,6 +46,9 @@ pub struct Changed {
     pub moves_mm: f64,
     /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
     pub beyond: f64,
+    /// By how much the points are off if it is the rig that is scaled and not the target, mm, where that is more and their covariance does not allow
+    /// for it.
+    pub scaled_mm: Option<f64>,
 }
 
 /// Names what changed, where more than chance did; and the estimate to go on with, in which the change is allowed for.
@@ -71,9 +75,17 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
-    let shifts_mm = shifts_mm(&found, &free);
-    let moves_mm = root_mean_square(shifts_mm.iter().flatten().map(|shift| shift.norm_squared())).unwrap_or(0.0);
-    let changed = Changed { explanations: equals, moves_mm, beyond: beyond(&found, &free, &shifts_mm) };
+    let by = |shifts_mm: &[Option<Vector3<f64>>]| {
+        let moves_mm = root_mean_square(shifts_mm.iter().flatten().map(|shift| shift.norm_squared())).unwrap_or(0.0);
+        (moves_mm, beyond(&found, &free, shifts_mm))
+    };
+    let (moves_mm, beyond) = by(&shifts_mm(&found, &free));
+    // A target that is larger and a rig that is smaller by one share look the same, whatever became of the fit with the latter.
+    let scaled = |pose: &Transform| pose.translation.vector * (first.amount / (1.0 + first.amount));
+    let if_scaled: Vec<_> = found.values.poses.iter().map(|pose| pose.as_ref().map(scaled)).collect();
+    let scaled_mm = Some(by(&if_scaled)).filter(|(_, beyond)| first.cause == Cause::Pitch && *beyond > ALLOWED);
+    let scaled_mm = scaled_mm.map(|(mm, _)| mm).filter(|mm| *mm > 2.0 * moves_mm);
+    let changed = Changed { explanations: equals, moves_mm, beyond, scaled_mm };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),

@@ -52,19 +52,27 @@ impl Judgement {
         !matches!(self, Judgement::Agrees | Judgement::Allowed(_))
     }
 
+    /// True where points may be off by more than this, mm, and their covariances do not say so.
+    pub fn leaves_open(&self, tolerance_mm: f64) -> bool {
+        matches!(self, Judgement::Allowed(Changed { scaled_mm: Some(mm), .. }) if *mm > tolerance_mm)
+    }
+
     /// What is wrong, for a person; `None` where nothing is.
     pub fn describe(&self, rig: &Rig, board: &Board) -> Option<String> {
         Some(match self {
             Judgement::Agrees => return None,
             Judgement::Allowed(changed) => format!(
-                "{}: {}; the points move by {:.4} mm with it, and their covariance allows for that",
+                "{}: {}; the points move by {:.4} mm with it, and their covariance allows for that{}",
                 match changed.explanations.as_slice() {
                     [Explanation { cause: Cause::Pitch, .. }, ..] =>
                         "the target is not quite as it was said to be, or the rig is not quite the one that was calibrated",
                     _ => "the rig is not quite the one that was calibrated",
                 },
                 causes(changed, rig, board),
-                changed.moves_mm
+                changed.moves_mm,
+                changed.scaled_mm.map_or(String::new(), |mm| format!(
+                    "; but if the target is as was said, the rig is scaled and the points are off by {mm:.3} mm: measure the target's squares, and                      give them by `--square-mm`"
+                ))
             ),
             Judgement::Contradicts(changed) => format!(
                 "the calibration does not suit these pictures: {}; the points are off by {:.3} mm with it",
