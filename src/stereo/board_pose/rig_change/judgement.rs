@@ -71,7 +71,8 @@ impl Judgement {
                 causes(changed, rig, board),
                 changed.moves_mm,
                 changed.scaled_mm.map_or(String::new(), |mm| format!(
-                    "; but if the target is as was said, the rig is scaled and the points are off by {mm:.3} mm: measure the target's squares, and                      give them by `--square-mm`"
+                    "; but if the target is as was said, the rig is scaled and the points are off by {mm:.3} mm: measure the target's squares, and \
+                     give them by `--square-mm`"
                 ))
             ),
             Judgement::Contradicts(changed) => format!(
