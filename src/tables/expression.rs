@@ -269,6 +269,11 @@ mod tests {
         }
         let (sine, radians, _) = of("0.2 + sin(pi/6)/np.sqrt(4) * 2").unwrap();
         assert!((sine - 0.7).abs() < 1e-12 && !radians);
+    }
+
+    #[test]
+    fn what_is_no_formula_has_no_value() {
+        let of = |text: &str| evaluate(text, &|_| None).map(|v| v.number);
         for text in [
             "",
             "a1",

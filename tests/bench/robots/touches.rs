@@ -193,7 +193,7 @@ fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
     let unknown = Dataset { known: Vec::new(), ..set.clone() };
     let said = identify(&unknown, &nominal, &settings, 1, &|_| {}).is_ok_and(|found| {
         let findings = record::findings::findings(&unknown, &found, &Default::default());
-        findings.iter().any(|f| f.finding.contains("scale of the robot unseen"))
+        findings.iter().any(|f| f.finding.contains("do not determine the scale"))
     });
     [before[0], before[1], after[0], after[1], plain[0], plain[1], f64::from(u8::from(said))]
 }

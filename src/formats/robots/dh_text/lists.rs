@@ -84,15 +84,20 @@ pub(super) fn links(plain: &Lists, families: &BTreeMap<String, Lists>) -> Result
 
 /// Bytes of a value: to the comma, the end of the line or the bracket that ends it.
 pub(super) fn extent(value: &str) -> usize {
+    up_to(value, &[',', ';', '\n'])
+}
+
+/// Bytes to one of these outside of all brackets, or to the bracket that ends what is read.
+pub(super) fn up_to(text: &str, ends: &[char]) -> usize {
     let mut depth = 0usize;
-    for (at, c) in value.char_indices() {
+    for (at, c) in text.char_indices() {
         match c {
             '(' | '[' | '{' => depth += 1,
             ')' | ']' | '}' if depth == 0 => return at,
             ')' | ']' | '}' => depth -= 1,
-            ',' | ';' | '\n' if depth == 0 => return at,
+            _ if depth == 0 && ends.contains(&c) => return at,
             _ => {}
         }
     }
-    value.len()
+    text.len()
 }

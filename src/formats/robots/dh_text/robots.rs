@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::link::Wrong;
-use super::lists::extent;
+use super::lists::{extent, up_to};
 
 /// Calls that make a robot of links.
 const CALLS: [&str; 3] = ["SerialLink", "DHRobot", "super().__init__"];
@@ -69,8 +69,8 @@ fn made(code: &str) -> Vec<Made<'_>> {
         {
             continue;
         }
-        let end = end(inside);
-        let first = inside[..extent(&inside[..end])].trim();
+        let end = up_to(inside, &[]);
+        let first = inside[..extent(inside)].trim();
         let is_name = |text: &str| !text.is_empty() && text.chars().all(|c| c.is_alphanumeric() || c == '_');
         let lines = |text: &str| text.matches('\n').count() as u64;
         let line = 1 + lines(before);
@@ -80,20 +80,6 @@ fn made(code: &str) -> Vec<Made<'_>> {
     }
     made.sort_by_key(|made| made.lines);
     made
-}
-
-/// Bytes to the bracket that ends a call.
-fn end(inside: &str) -> usize {
-    let mut depth = 0usize;
-    for (at, c) in inside.char_indices() {
-        match c {
-            '(' | '[' | '{' => depth += 1,
-            ')' | ']' | '}' if depth == 0 => return at,
-            ')' | ']' | '}' => depth -= 1,
-            _ => {}
-        }
-    }
-    inside.len()
 }
 
 /// The name that a call gives: `'name', 'left arm'`, `name="left arm"`.

@@ -81,10 +81,12 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     };
     let (moves_mm, beyond) = by(&shifts_mm(&found, &free));
     // A target that is larger and a rig that is smaller by one share look the same, whatever became of the fit with the latter.
-    let scaled = |pose: &Transform| pose.translation.vector * (first.amount / (1.0 + first.amount));
-    let if_scaled: Vec<_> = found.values.poses.iter().map(|pose| pose.as_ref().map(scaled)).collect();
-    let scaled_mm = Some(by(&if_scaled)).filter(|(_, beyond)| first.cause == Cause::Pitch && *beyond > ALLOWED);
-    let scaled_mm = scaled_mm.map(|(mm, _)| mm).filter(|mm| *mm > 2.0 * moves_mm);
+    let if_scaled = || {
+        let scaled = |pose: &Transform| pose.translation.vector * (first.amount / (1.0 + first.amount));
+        by(&found.values.poses.iter().map(|pose| pose.as_ref().map(scaled)).collect::<Vec<_>>())
+    };
+    let scaled = (first.cause == Cause::Pitch).then(if_scaled);
+    let scaled_mm = scaled.filter(|(mm, beyond)| *beyond > ALLOWED && *mm > 2.0 * moves_mm).map(|(mm, _)| mm);
     let changed = Changed { explanations: equals, moves_mm, beyond, scaled_mm };
     match with_cause(&found, on_rig, known, usual) {
         Some(allowed) => (allowed, Some(changed)),
