@@ -38,7 +38,8 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         findings.splice(0..0, of_rows);
         (set, of_orientations) = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         (set, of_known) = known::examine(&set, &robot, settings);
-        findings.extend(of_orientations.into_iter().chain(of_known));
+        findings.extend(of_orientations);
+        findings.extend(of_known);
     }
     step("sessions along the rows");
     let robots = if settings.examine { robots::find(&set, &robot, settings) } else { None };

@@ -1,14 +1,16 @@
-//! What is wrong with the orientations of points: degrees for radians, angles about fixed axes for a rotation vector.
+//! What is wrong with the orientations of points: degrees for radians, angles about axes for a rotation vector, the inverse rotation.
 //!
 //! In: a data set and the nominal robot. Out: the set as the best hypothesis has it, and its name. The turn of the target between two
-//! poses of a placement is that of the flange, whatever the sensor's frame and the target's are; where the two differ, each hypothesis is
-//! tried, and the one with which they agree is taken.
-//! What goes wrong: an inverse rotation turns by the same angle, and is not told from the rotation.
+//! poses of a placement is that of the flange, about an axis that stands in the sensor's frame as the flange's does in the base: one rotation
+//! brings all axes together (Wahba, 1965), whatever the sensor's frame and the target's are. Where none does, each hypothesis is tried, and the one
+//! with which they agree is taken; each placement by itself.
+//! What goes wrong: where all turns are about one axis, an inverse rotation is not told from the rotation.
 
 use std::f64::consts::PI;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
+use crate::geometry::nearest_rotation;
 use crate::identify::data::dataset::{Dataset, Pose, Reading};
 use crate::identify::finding::Finding;
 use crate::robot::Robot;
@@ -20,60 +22,131 @@ const IMPLAUSIBLE_RAD: f64 = 0.05;
 /// A hypothesis explains what is wrong when it brings the difference down by this factor.
 const EXPLAINS: f64 = 4.0;
 
-/// Pairs of poses that are enough to tell.
+/// Median of the length of a vector whose three components are normal, over that of the size of one of them: what noise alone makes of turns
+/// about axes beside the turns' sizes.
+const OF_NOISE: f64 = 1.538 / 0.6745;
+
+/// Pairs of poses that are enough to tell, and poses of a placement that tell by themselves.
 const PAIRS: usize = 200;
+const FEWEST: usize = 8;
 
 /// A rotation from three numbers.
 type Reader = fn(Vector3<f64>) -> UnitQuaternion<f64>;
 
 /// Ways in which three numbers may have been meant, and their names.
-const HYPOTHESES: [(&str, Reader); 3] = [
-    ("rotation vectors in degrees, not in radians", |v| UnitQuaternion::from_scaled_axis(v * PI / 180.0)),
+const HYPOTHESES: [(&str, Reader); 9] = [
+    ("rotation vectors in degrees, not in radians", |v| UnitQuaternion::from_scaled_axis(v * DEG)),
+    ("inverse (the sensor as the target sees it)", |v| UnitQuaternion::from_scaled_axis(-v)),
+    ("inverse (the sensor as the target sees it), and in degrees", |v| UnitQuaternion::from_scaled_axis(-v * DEG)),
     ("angles about fixed x, y and z, not rotation vectors", of_fixed_axes),
-    ("angles about fixed x, y and z in degrees, not rotation vectors in radians", |v| of_fixed_axes(v * PI / 180.0)),
+    ("angles about fixed x, y and z in degrees, not rotation vectors in radians", |v| of_fixed_axes(v * DEG)),
+    ("angles about z, y and x that turn with it, in this order, not rotation vectors", |v| of_fixed_axes(v.zyx())),
+    ("angles about z, y and x that turn with it, in this order and in degrees, not rotation vectors in radians", |v| {
+        of_fixed_axes(v.zyx() * DEG)
+    }),
+    ("angles about x, y and z that turn with it, not rotation vectors", of_turning_axes),
+    ("angles about x, y and z that turn with it, in degrees, not rotation vectors in radians", |v| {
+        of_turning_axes(v * DEG)
+    }),
 ];
+
+/// A degree, rad.
+const DEG: f64 = PI / 180.0;
 
 fn of_fixed_axes(v: Vector3<f64>) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(v.x, v.y, v.z)
 }
 
+fn of_turning_axes(v: Vector3<f64>) -> UnitQuaternion<f64> {
+    of_fixed_axes(-v).inverse()
+}
+
+/// What is told of the orientations of some placements.
+enum Told {
+    /// They go with the joints, or are too few to say.
+    Suit,
+    /// They are this instead, by the difference as they were read and as they were meant, rad.
+    Meant(&'static str, Reader, [f64; 2]),
+    /// They go with no other pose of the file either, by so much, rad.
+    Contradict(f64),
+}
+
 /// The set with orientations that go with the joints, and what was wrong with them. Those that don't are left out unless they are `asked` for.
-pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Option<Finding>) {
+pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Vec<Finding>) {
     let mut set = set.clone();
-    let Some(as_read) = difference_rad(&set, robot, UnitQuaternion::from_scaled_axis) else { return (set, None) };
-    if as_read < IMPLAUSIBLE_RAD {
-        return without_turned(set, robot, EXPLAINS * as_read);
+    let all: Vec<usize> = (0..set.groups.len()).collect();
+    let told = told(&set, robot, &all);
+    if let Told::Meant(..) = told {
+        let finding = mend(&mut set, &all, told, asked);
+        return (set, finding.into_iter().collect());
     }
-    let tried =
-        HYPOTHESES.iter().filter_map(|(name, reader)| Some((difference_rad(&set, robot, *reader)?, name, reader)));
-    let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((left, name, reader)) = best.filter(|(left, ..)| left * EXPLAINS < as_read) else {
-        let said = format!(
-            "the orientations contradict the joint angles: between poses the target turns by {:.1} deg more or less than the flange",
-            as_read.to_degrees()
-        );
-        if !asked {
-            for pose in &mut set.poses {
-                if let Reading::Position { rotation_rad, .. } = &mut pose.reading {
-                    *rotation_rad = None;
-                }
-            }
-        }
-        let action = "they are left out unless `--model pose` asks for them; look at rx_rad, ry_rad, rz_rad";
-        return (set, Some(Finding::new(said, action)));
+    // Sensors that write differently, each by its placement where it has enough poses.
+    let has_enough = |&group: &usize| set.rows(|pose| pose.group == group).len() >= FEWEST;
+    let of_groups: Vec<(usize, Told)> =
+        all.iter().copied().filter(has_enough).map(|group| (group, self::told(&set, robot, &[group]))).collect();
+    let is_odd = |told: &Told| !matches!(told, Told::Suit);
+    if !is_odd(&told) && !of_groups.iter().any(|(_, told)| is_odd(told)) {
+        let usual_rad =
+            difference_rad(&set, robot, &all, UnitQuaternion::from_scaled_axis).map_or(0.0, |[size, _]| size);
+        let (set, finding) = without_turned(set, robot, EXPLAINS * usual_rad);
+        return (set, finding.into_iter().collect());
+    }
+    if of_groups.iter().all(|(_, told)| matches!(told, Told::Contradict(_))) {
+        let finding = mend(&mut set, &all, told, asked);
+        return (set, finding.into_iter().collect());
+    }
+    let findings = of_groups.into_iter().filter_map(|(group, told)| mend(&mut set, &[group], told, asked)).collect();
+    (set, findings)
+}
+
+fn told(set: &Dataset, robot: &Robot, groups: &[usize]) -> Told {
+    let difference = |reader: Reader| difference_rad(set, robot, groups, reader);
+    let Some([size, whole]) = difference(UnitQuaternion::from_scaled_axis) else { return Told::Suit };
+    if size < IMPLAUSIBLE_RAD && whole < IMPLAUSIBLE_RAD.max(EXPLAINS * OF_NOISE * size) {
+        return Told::Suit;
+    }
+    let tried = HYPOTHESES.iter().filter_map(|(name, reader)| Some((difference(*reader)?[1], name, reader)));
+    match tried.min_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((left, name, reader)) if left * EXPLAINS < whole => Told::Meant(name, *reader, [whole, left]),
+        _ => Told::Contradict(whole),
+    }
+}
+
+/// Takes the orientations of these groups as they are meant, or leaves them out.
+fn mend(set: &mut Dataset, groups: &[usize], told: Told, asked: bool) -> Option<Finding> {
+    let whose = match groups {
+        [one] if set.groups.len() > 1 => format!("the orientations of group {}", set.groups[*one].name),
+        _ => "the orientations".to_owned(),
     };
-    for pose in &mut set.poses {
-        if let Reading::Position { rotation_rad: Some(rotation), .. } = &mut pose.reading {
-            *rotation = reader(*rotation).scaled_axis();
+    let rotations = set.poses.iter_mut().filter(|pose| groups.contains(&pose.group));
+    let rotations = rotations.filter_map(|pose| match &mut pose.reading {
+        Reading::Position { rotation_rad, .. } => Some(rotation_rad),
+        _ => None,
+    });
+    match told {
+        Told::Suit => None,
+        Told::Meant(name, reader, [from, to]) => {
+            rotations.flatten().for_each(|rotation| *rotation = reader(*rotation).scaled_axis());
+            let said = format!(
+                "{whose} are {name} (turns between poses differ from the flange's by {:.2} deg, before by {:.1})",
+                to.to_degrees(),
+                from.to_degrees()
+            );
+            let action = "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)";
+            Some(Finding::new(said, action))
+        }
+        Told::Contradict(off) => {
+            let said = format!(
+                "{whose} contradict the joint angles: between poses the target turns otherwise than the flange, by {:.1} deg",
+                off.to_degrees()
+            );
+            if !asked {
+                rotations.for_each(|rotation| *rotation = None);
+            }
+            let action = "they are left out unless `--model pose` asks for them; look at rx_rad, ry_rad, rz_rad";
+            Some(Finding::new(said, action))
         }
     }
-    let said = format!(
-        "the orientations are {name} (turns between poses differ from the flange's by {:.2} deg, before by {:.1})",
-        left.to_degrees(),
-        as_read.to_degrees()
-    );
-    let action = "mended for this run; mend the file (`examine = false` in [identify] takes it as it is)";
-    (set, Some(Finding::new(said, action)))
 }
 
 /// Several targets count with their turn; a pose whose turn is another one is left out. Their lengths don't tell the names of targets that
@@ -109,21 +182,32 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
     (set.without(&turned, "the targets are turned otherwise than the flange"), Some(finding))
 }
 
-/// Median difference between the target's turn from pose to pose and the flange's, rad; `None` without orientations in two poses of one
-/// group.
-fn difference_rad(set: &Dataset, robot: &Robot, reader: Reader) -> Option<f64> {
+/// Median difference between the target's turn from pose to pose and the flange's, rad: of its size alone, and of the whole turn in the frame that
+/// brings the axes together; `None` without orientations in two poses of one group.
+fn difference_rad(set: &Dataset, robot: &Robot, groups: &[usize], reader: Reader) -> Option<[f64; 2]> {
     let oriented = |row: usize| set.poses[row].reading.rotation_rad().map(reader);
     let flange = |row: usize| robot.base_from_flange(&set.poses[row].joints_rad).rotation;
-    let mut differences = Vec::new();
-    for group in 0..set.groups.len() {
+    let (mut sizes, mut wholes) = (Vec::new(), Vec::new());
+    for &group in groups {
         let rows = set.rows(|p| p.group == group);
-        for two in rows.windows(2).take(PAIRS) {
-            if let (Some(a), Some(b)) = (oriented(two[0]), oriented(two[1])) {
-                differences.push((a.angle_to(&b) - flange(two[0]).angle_to(&flange(two[1]))).abs());
-            }
-        }
+        let turn = |two: &[usize]| {
+            let (a, b) = (oriented(two[0])?, oriented(two[1])?);
+            Some((b * a.inverse(), flange(two[1]) * flange(two[0]).inverse()))
+        };
+        let turns: Vec<_> = rows.windows(2).take(PAIRS).filter_map(turn).collect();
+        let products: Matrix3<f64> =
+            turns.iter().map(|(read, of_flange)| axial(read) * axial(of_flange).transpose()).sum();
+        let frame =
+            UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(nearest_rotation(&products)));
+        sizes.extend(turns.iter().map(|(read, of_flange)| (read.angle() - of_flange.angle()).abs()));
+        wholes.extend(turns.iter().map(|(read, of_flange)| read.angle_to(&(frame * of_flange * frame.inverse()))));
     }
-    median(differences)
+    Some([median(sizes)?, median(wholes)?])
+}
+
+/// The axis times the sine of the turn: of half a turn, whose axis may point either way, there is none.
+fn axial(turn: &UnitQuaternion<f64>) -> Vector3<f64> {
+    2.0 * turn.w * turn.imag()
 }
 
 #[cfg(test)]
@@ -149,7 +233,7 @@ mod tests {
         };
         let (right, read) = (rows(&|r| r.scaled_axis()), rows(written));
         let (mended, finding) = examine(&read, &world.nominal, false);
-        (right, mended, finding.map(|f| f.finding))
+        (right, mended, finding.into_iter().next().map(|f| f.finding))
     }
 
     /// How orientations are written.
@@ -169,10 +253,17 @@ mod tests {
     #[test]
     fn other_ways_of_writing_them_are_named_and_mended() {
         let degrees = |v: Vector3<f64>| v * 180.0 / PI;
-        let ways: [(Writer, &str); 3] = [
+        let ways: [(Writer, &str); 7] = [
             (&|r| degrees(r.scaled_axis()), "rotation vectors in degrees"),
+            (&|r| -r.scaled_axis(), "inverse (the sensor as the target sees it) ("),
+            (&|r| degrees(-r.scaled_axis()), "inverse (the sensor as the target sees it), and in degrees"),
             (&fixed_axes, "angles about fixed x, y and z, not"),
             (&|r| degrees(fixed_axes(r)), "angles about fixed x, y and z in degrees"),
+            (
+                &|r| degrees(fixed_axes(r).zyx()),
+                "angles about z, y and x that turn with it, in this order and in degrees",
+            ),
+            (&|r| -fixed_axes(r.inverse()), "angles about x, y and z that turn with it, not"),
         ];
         for (written, name) in ways {
             let (right, mended, said) = said(written);

@@ -51,3 +51,20 @@ fn points_that_were_measured_leave_more_than_their_digits() {
     }
     assert_eq!(said(&world), None);
 }
+
+#[test]
+fn points_computed_and_written_with_six_digits_each_are_known_too() {
+    // Joints in radians, as many a controller shows them, and points with as many digits before the point as they need.
+    for (seed, joints_rad, noise_mm) in [(1, 1e-5, 0.0), (2, 1e-4, 0.0), (3, 1e-5, 0.05)] {
+        let mut world = planned(66, 0, 25.0, noise_mm, seed, &|_| {});
+        for row in &mut world.rows {
+            for q in &mut row.at.joints_deg {
+                *q = ((q.to_radians() / joints_rad).round() * joints_rad).to_degrees();
+            }
+            let at = point(row);
+            *at = Point3::from(at.coords.map(|x| format!("{x:.5e}").parse().unwrap()));
+        }
+        let told = said(&world);
+        assert_eq!(told.is_some_and(|told| told.contains("not measured")), noise_mm == 0.0, "{joints_rad} rad");
+    }
+}
