@@ -25,6 +25,8 @@ pub struct Difference {
     pub off: DVector<f64>,
     joint: Joint,
     freedom: f64,
+    /// Whether the covariance is known but for its size.
+    is_sized: bool,
 }
 
 /// A covariance, ready to be divided by.
@@ -56,18 +58,19 @@ impl Difference {
     /// there. `None` where the covariance is singular.
     pub fn new(off: DVector<f64>, joint: &DMatrix<f64>, pairs: usize, scatter: f64) -> Option<Difference> {
         let joint = Joint::Whole((0.5 * (joint + joint.transpose())).cholesky()?);
-        Some(Difference { off, joint, freedom: freedom(pairs, scatter) })
+        Some(Difference { off, joint, freedom: freedom(pairs, scatter), is_sized: false })
     }
 
-    /// The same of numbers that are known to a unit each, and beside that to the product of these columns with themselves.
-    pub fn of_white(off: DVector<f64>, columns: DMatrix<f64>, pairs: usize) -> Option<Difference> {
+    /// The same of numbers that are known to a unit each, and beside that to the product of these columns with themselves. How large that unit is,
+    /// so many degrees of freedom tell.
+    pub fn of_white(off: DVector<f64>, columns: DMatrix<f64>, freedom: f64) -> Option<Difference> {
         let (numbers, count) = columns.shape();
         if numbers <= count {
             let whole = DMatrix::identity(numbers, numbers) + &columns * columns.transpose();
-            return Difference::new(off, &whole, pairs, 1.0);
+            return Some(Difference { off, joint: Joint::Whole(whole.cholesky()?), freedom, is_sized: true });
         }
         let inner = (DMatrix::identity(count, count) + columns.transpose() * &columns).cholesky()?;
-        Some(Difference { off, joint: Joint::Beyond(columns, inner), freedom: freedom(pairs, 1.0) })
+        Some(Difference { off, joint: Joint::Beyond(columns, inner), freedom, is_sized: true })
     }
 
     /// Squared difference in units of its covariance.
@@ -83,7 +86,7 @@ impl Difference {
     /// What it stays within but for this chance, where so many numbers are free to differ; infinite where too few pairs tell.
     pub fn limit(&self, numbers: usize, chance: f64) -> f64 {
         let (p, n) = (numbers as f64, self.freedom);
-        let inner = n - p + 1.0;
+        let inner = if self.is_sized { n } else { n - p + 1.0 };
         if inner <= 1.0 {
             return f64::INFINITY;
         }
@@ -130,6 +133,9 @@ mod tests {
         assert!((six.level(0.01) - 4.032).abs() < 5e-3);
         assert!((six.limit(2, 0.01) / (18.0 * 5.0 * 2.0 / 4.0) - 1.0).abs() < 5e-3);
         assert_eq!(six.limit(6, 0.01), f64::INFINITY);
+        // Fisher's of 2 and 5 where the covariance is known but for its size.
+        let sized = Difference::of_white(DVector::zeros(2), DMatrix::zeros(2, 1), 5.0).unwrap();
+        assert!((sized.limit(2, 0.01) / (2.0 * 13.274) - 1.0).abs() < 5e-3, "{}", sized.limit(2, 0.01));
     }
 
     #[test]
@@ -149,8 +155,9 @@ mod tests {
             let off = DVector::from_fn(numbers, |r, _| ((3 * r) as f64).cos());
             let along = DVector::from_fn(numbers, |r, _| ((r * r) as f64).sin());
             let whole = DMatrix::identity(numbers, numbers) + &columns * columns.transpose();
-            let whole = Difference::new(off.clone(), &whole, 60, 1.0).unwrap();
-            let few = Difference::of_white(off, columns, 60).unwrap();
+            let known = freedom(60, 1.0);
+            let whole = Difference { is_sized: true, ..Difference::new(off.clone(), &whole, 60, 1.0).unwrap() };
+            let few = Difference::of_white(off, columns, known).unwrap();
             assert!((whole.chi_square() / few.chi_square() - 1.0).abs() < 1e-8);
             let [(a, of_a), (b, of_b)] = [&whole, &few].map(|difference| difference.along(&along).unwrap());
             assert!((a - b).abs() < 1e-8 * of_a && (of_a / of_b - 1.0).abs() < 1e-8, "{a} {b} {of_a} {of_b}");

@@ -26,6 +26,8 @@ pub struct RobotRecheckFile {
     effect_mm: f64,
     /// The largest movement of the target that a single cause could make without being seen in nineteen of twenty checks, mm.
     seen_mm: f64,
+    /// The largest movement of the target by a single cause that these poses leave room for, with a chance of nineteen in twenty, mm.
+    at_most_mm: f64,
     causes: Vec<CauseSeen>,
     placements: Vec<Moved>,
 }
@@ -33,7 +35,7 @@ pub struct RobotRecheckFile {
 impl RobotRecheckFile {
     pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64, own_data: bool) -> RobotRecheckFile {
         let changed = !recheck.cause().is_empty();
-        let standing = match Standing::of(changed, recheck.effect_mm, recheck.seen_mm, tolerance_mm) {
+        let standing = match Standing::of(changed, recheck.effect_mm, recheck.at_most_mm, tolerance_mm) {
             // Rows from before say nothing of what happened since, whatever they say.
             _ if own_data => Standing::OwnData,
             _ if !recheck.extrapolated.is_empty() => Standing::Undecided,
@@ -50,6 +52,7 @@ impl RobotRecheckFile {
             statement: recheck.statement(),
             effect_mm: recheck.effect_mm,
             seen_mm: recheck.seen_mm,
+            at_most_mm: recheck.at_most_mm,
             causes: recheck.causes.clone(),
             placements: recheck.placements.clone(),
         }

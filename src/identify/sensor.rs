@@ -56,6 +56,9 @@ impl Extra {
 /// Logarithm of the evidence that an unknown of the sensor, or another reading of its covariances, must bring: one in four hundred.
 pub const EVIDENCE: f64 = 6.0;
 
+/// A robot's repeatability where nothing says more of it, mm: that of a common arm's data sheet.
+pub const REPEATABILITY_MM: f64 = 0.02;
+
 /// Variance that singular covariances get on top, mm^2: a micrometre, the resolution of a good instrument.
 pub const FLOOR_MM2: f64 = 1e-6;
 
@@ -129,6 +132,9 @@ pub struct Scatter {
     /// Variance of a coordinate by which the robot may be expected to scatter beyond that, where the readings' own noise hides it, mm^2: it is
     /// in no weight, but in what is promised of fresh poses.
     pub hidden_mm2: f64,
+    /// Standard deviation to which the residuals tell the variance of a fresh pose, mm^2, and degrees of freedom by which they tell that of a reading.
+    pub fresh_sd_mm2: f64,
+    pub freedom: f64,
     /// A smooth error that the points of a placement share, beside all these.
     pub smooth: Option<SmoothError>,
 }
@@ -136,12 +142,22 @@ pub struct Scatter {
 impl Scatter {
     /// Of a point, its covariance taken at its word.
     pub fn of_point(point_mm: f64) -> Scatter {
-        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0, hidden_mm2: 0.0, smooth: None }
+        let known = f64::INFINITY;
+        let [hidden_mm2, fresh_sd_mm2] = [0.0; 2];
+        Scatter { point_mm, rotation_rad: 1e-4, stated: 1.0, hidden_mm2, fresh_sd_mm2, freedom: known, smooth: None }
     }
 
     /// Mean square by which a coordinate of a fresh pose is to be expected off, mm^2.
     pub fn fresh_mm2(&self) -> f64 {
         self.point_mm * self.point_mm + self.hidden_mm2
+    }
+
+    /// Degrees of freedom of a mean square that is to be expected of fresh poses, of which so large a share is their own scatter: the rest follows from
+    /// readings that are as large as the residuals say (Satterthwaite, 1946). At the least two, of which a mean can be told.
+    pub fn freedom_of(&self, share_of_fresh: f64) -> f64 {
+        let of_fresh = share_of_fresh * self.fresh_sd_mm2 / self.fresh_mm2().max(f64::MIN_POSITIVE);
+        let of_rest = (1.0 - share_of_fresh) * (2.0 / self.freedom).sqrt();
+        (2.0 / (of_fresh + of_rest).powi(2)).max(2.0)
     }
 
     /// Whole covariance of a point, mm^2.

@@ -35,9 +35,12 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
     let statement = format!("{mended}{far_within}{}", recheck.statement());
     let of_rest = match recheck.cause().is_empty() {
         true => format!(
-            "{statement}; {} poses would have shown a single cause that moves the target by {} mm, tolerance {tolerance} mm",
+            "{statement}; these {} poses leave room for a single cause that moves the target by up to {} mm (95 %), tolerance {tolerance} mm, and \
+             see each one that moves it by {} mm in 19 of 20 such checks{}",
             recheck.poses.len(),
-            mm(recheck.seen_mm)
+            mm(recheck.at_most_mm),
+            mm(recheck.seen_mm),
+            recheck.unseen().map_or_else(String::new, |unseen| format!(", and nothing of: {unseen}"))
         ),
         false => {
             format!("{statement}; the target is off by up to {} mm, tolerance {tolerance} mm", mm(recheck.effect_mm))
@@ -65,7 +68,7 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
             "check with poses inside these ranges, or identify anew with poses of both"
         }
         Standing::Undecided => {
-            "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these would not have shown a change as large as the tolerance"
+            "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these do not rule out a change as large as the tolerance"
         }
         Standing::OwnData => "measure ten new poses",
         _ if !recheck.changed && recheck.by_cameras => "`stereocal locate` finds the cameras anew; the robot stays",
@@ -163,6 +166,7 @@ pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[Str
     let Judged { standing, tolerance_mm, .. } = judged;
     let numbers = vec![
         (format!("{} mm", two_digits(recheck.effect_mm)), "movement of the target beyond chance".to_owned()),
+        (format!("{} mm", two_digits(recheck.at_most_mm)), "not ruled out".to_owned()),
         (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
         (format!("{} mm", two_digits(tolerance_mm)), "tolerance".to_owned()),
     ];

@@ -65,6 +65,8 @@ struct Expected {
     mean_mm: f64,
     p95_mm: f64,
     #[serde(default)]
+    freedom: Option<f64>,
+    #[serde(default)]
     joint_ranges: Vec<[f64; 2]>,
     map: Vec<(String, f64)>,
 }
@@ -134,5 +136,6 @@ pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     let trust = Trust { point_mm, rotation_rad: identified.scatter_rad };
     let (poses, p95_mm) = (expected.map.len(), expected.p95_mm);
     let along = identified.variance_along;
-    Some(Before { parameters, covariance, correction, trust, along, poses, p95_mm })
+    let freedom = expected.freedom.unwrap_or(3.0 * expected.map.len() as f64);
+    Some(Before { parameters, covariance, correction, trust, along, poses, freedom, p95_mm })
 }

@@ -14,6 +14,7 @@ use super::placement::Placed;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::rows::Rows;
+pub use crate::identify::sensor::REPEATABILITY_MM;
 use crate::identify::sensor::{Raw, Scatter};
 use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
@@ -24,9 +25,6 @@ use crate::robot::{Parameter, Robot};
 
 /// Fewest poses of a placement.
 pub const FEWEST_POSES: usize = 3;
-
-/// A robot's repeatability where nothing says more of it, mm: that of a common arm's data sheet.
-pub const REPEATABILITY_MM: f64 = 0.02;
 
 /// What is not known to this, mm or mrad, is not determined: a tenth of a small arm's reach.
 const OPEN: f64 = 100.0;
@@ -101,8 +99,7 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
         point_mm: found.point_mm.max(trust.point_mm),
         rotation_rad: trust.rotation_rad.map_or(found.rotation_rad, |known| found.rotation_rad.max(known)),
         stated: found.stated.max(1.0),
-        hidden_mm2: 0.0,
-        smooth: None,
+        ..Scatter::of_point(0.0)
     };
     let load_chain = task.robot.shifted(task.parameters, &offsets);
     formulation.rows = task.rows_at(scatter, &load_chain);

@@ -16,7 +16,7 @@ use crate::identify::judge::lengths::Lengths;
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::Extra;
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::jacobian::RAD_PER_MRAD;
@@ -76,6 +76,8 @@ pub struct Placed {
     pub target_found: bool,
     /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of smooth errors.
     pub fresh_mm2: f64,
+    /// How large readings are off.
+    scatter: Scatter,
     kinematics: Kinematics,
     /// The robot that was found.
     pub robot: Robot,
@@ -125,6 +127,7 @@ impl Placed {
             target_found: parameters.iter().any(|p| matches!(p, Parameter::V(_))),
             covariance: together(shared, &follow, &own),
             of_sensor: &follow * DVector::from_column_slice(sensor),
+            scatter: rows.scatter,
             fresh_mm2: 3.0 * (rows.scatter.fresh_mm2() + rows.left_by_smooth_mm2()),
             kinematics: rows.kinematics.clone(),
             robot,
@@ -203,7 +206,10 @@ impl Placed {
             let total = &columns * &self.covariance * columns.transpose() + &of_sensor * of_sensor.transpose();
             Matrix3::from_fn(|r, c| total[(r, c)]) + Matrix3::identity() * (self.fresh_mm2 / 3.0)
         };
-        Lengths::new(&self.columns(index, &poses).into_iter().map(covariance).collect::<Vec<_>>())
+        let covariances: Vec<Matrix3<f64>> = self.columns(index, &poses).into_iter().map(covariance).collect();
+        let total_mm2 = covariances.iter().map(Matrix3::trace).sum::<f64>() / covariances.len().max(1) as f64;
+        let told = self.scatter.freedom_of((3.0 * self.scatter.fresh_mm2() / total_mm2).min(1.0));
+        Lengths::new(&covariances, told)
     }
 }
 

@@ -53,6 +53,8 @@ pub struct Expected {
     /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, repeatability, and smooth errors that
     /// the points of a placement share.
     pub scatter_mm: f64,
+    /// Degrees of freedom by which the residuals tell how large they are.
+    pub freedom: f64,
     /// For which poses it is said.
     pub poses: String,
     /// From where to where each joint was read there, deg (mm where it slides).
@@ -102,15 +104,18 @@ impl Expected {
                 of_errors[i].copy_from(&(of_robot + of_frame + fresh));
             }
         }
-        let of_rows = |all: &[Matrix3<f64>]| Lengths::new(&rows.iter().map(|&row| all[row]).collect::<Vec<_>>());
+        let total_mm2 = rows.iter().map(|&row| of_errors[row].trace()).sum::<f64>() / rows.len().max(1) as f64;
+        let told = formulation.rows.scatter.freedom_of((3.0 * scatter_mm2 / total_mm2).min(1.0));
+        let of_rows = |all: &[Matrix3<f64>]| Lengths::new(&rows.iter().map(|&row| all[row]).collect::<Vec<_>>(), told);
         let Lengths { mean_mm, p95_mm, max_mm } = of_rows(&of_errors);
-        let length = |row: &usize| (set.poses[*row].name.clone(), Length::new(&of_errors[*row]).mean_mm());
+        let length = |row: &usize| (set.poses[*row].name.clone(), Length::new(&of_errors[*row], told).mean_mm());
         Expected {
             mean_mm,
             p95_mm,
             max_mm,
             of_robot_mm: of_rows(&of_robots).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
+            freedom: formulation.rows.scatter.freedom,
             poses: region(set),
             joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),

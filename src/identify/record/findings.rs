@@ -50,7 +50,7 @@ impl Findings {
             let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
             judge.errors(found.robot(), &found.outliers)
         };
-        let left_out = left_out::of_a_joint(set, &found.fitted, &found.outliers, &errors);
+        let left_out = left_out::of_a_joint(set, found.robot(), &found.fitted, &found.outliers, &errors);
         let rounded = rounded::of_joints(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let against: Vec<Finding> = left_out
@@ -241,7 +241,7 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
             "each session got a placement of its own",
         );
     }
-    if !along.drifting.is_empty() {
+    if along.instead.is_none() && !along.drifting.is_empty() {
         add(
             "the sensor or the robot's base moves evenly along the rows of a group: a drift".to_owned(),
             along.drifting.clone(),

@@ -3,16 +3,20 @@
 //! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the joint, and the finding. Method:
 //! three looks. Rows in which a joint is not where it is in most of them, and rows that fill a part of its range: how likely it is that so many of
 //! them are among those left out by chance (the hypergeometric distribution). Errors along which a joint moves the target: gross errors go
-//! anywhere, so that the cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's method).
+//! anywhere, so that the cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's method). A joint
+//! that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque about it; else both are named.
 //! Each times the joints and ways that were looked at. Goes wrong: a joint that moves in every row; few rows whose errors share a direction in the
 //! sensor's frame, which is then no joint's.
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::RowError;
+use crate::robot::corrections::LoadPoint;
+use crate::robot::{Parameter, Robot};
 use crate::statistics::median;
 
 /// Share of a joint's way within which it is where it was.
@@ -38,11 +42,12 @@ const TURN: f64 = 1e-4;
 /// moved.
 pub fn of_a_joint(
     set: &Dataset,
+    robot: &Robot,
     fitted: &[usize],
     outliers: &[usize],
     errors: &dyn Fn(&Dataset) -> Vec<RowError>,
 ) -> Option<Finding> {
-    let (rows, joints) = (Rows { set, fitted, outliers }, set.joint_count());
+    let (rows, joints) = (Rows { set, robot, fitted, outliers }, set.joint_count());
     let first = |look: &dyn Fn(usize) -> Option<(f64, Finding)>| {
         (0..joints).filter_map(look).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, finding)| finding)
     };
@@ -53,6 +58,7 @@ pub fn of_a_joint(
 /// The rows that were fitted and those that were left out.
 struct Rows<'a> {
     set: &'a Dataset,
+    robot: &'a Robot,
     fitted: &'a [usize],
     outliers: &'a [usize],
 }
@@ -82,6 +88,38 @@ impl Rows<'_> {
         };
         let same = rows.iter().filter(|row| (of(row) - at).abs() <= SAME * (last.0 - first.0)).count();
         same as f64 >= NEARLY_ALL * rows.len() as f64
+    }
+
+    /// What turns a joint by these amounts in the rows that were left out, each with its weight.
+    fn cause(&self, joint: usize, amounts: &[(f64, f64)]) -> String {
+        let number = joint + 1;
+        let (elsewhere, bent) = (format!("joint {number} stood elsewhere"), format!("a load bent joint {number}"));
+        if self.set.is_sliding(joint) {
+            return elsewhere;
+        }
+        let moved = |parameter: Parameter, q: &[f64]| {
+            self.robot.shifted(&[parameter], &[1.0]).target_mm(q) - self.robot.target_mm(q)
+        };
+        let torque = |&row: &usize| {
+            let q = &self.set.poses[row].joints_rad;
+            let (turn, load) =
+                (moved(Parameter::Theta(joint), q), moved(Parameter::Gravity(joint, LoadPoint::Tool), q));
+            turn.dot(&load) / turn.norm_squared().max(f64::MIN_POSITIVE)
+        };
+        let torques: Vec<f64> = self.outliers.iter().map(torque).collect();
+        // Squares that are left where amounts are a multiple of these numbers.
+        let left = |of: &dyn Fn(usize) -> f64| {
+            let sum = |f: &dyn Fn(usize) -> f64| (0..amounts.len()).map(|k| amounts[k].1 * f(k)).sum::<f64>();
+            let [both, own] = [sum(&|k| amounts[k].0 * of(k)), sum(&|k| of(k).powi(2))];
+            sum(&|k| amounts[k].0.powi(2)) - both * both / own.max(f64::MIN_POSITIVE)
+        };
+        let [alike, as_torques] = [left(&|_| 1.0), left(&|k| torques[k])].map(|left| left.max(f64::MIN_POSITIVE));
+        let likelier = 0.5 * amounts.len() as f64 * (alike / as_torques).ln();
+        match likelier {
+            _ if likelier < -TOLD_APART => elsewhere,
+            _ if likelier > TOLD_APART => bent,
+            _ => format!("{elsewhere}, or {bent}, which they do not tell apart,"),
+        }
     }
 
     fn are_many(&self, rows: usize) -> bool {
@@ -159,12 +197,14 @@ fn along(of: &Rows, errors: &dyn Fn(&Dataset) -> Vec<RowError>) -> Option<Findin
             (e.dot(d).powi(2) / (e.norm_squared() * d.norm_squared())).min(1.0)
         };
         let shares: Vec<f64> = here.iter().zip(&motion).map(share).filter(|share| share.is_finite()).collect();
-        let amounts = here.iter().zip(&motion).map(|(e, d)| (e.dot(d) / d.norm_squared()).abs());
-        (shares.len() == here.len()).then(|| (mean(&shares), joint, by_cosines(&shares), median(amounts)))
+        let amounts: Vec<(f64, f64)> =
+            here.iter().zip(&motion).map(|(e, d)| (e.dot(d) / d.norm_squared(), d.norm_squared())).collect();
+        (shares.len() == here.len()).then(|| (mean(&shares), joint, by_cosines(&shares), amounts))
     };
     let joints = of.set.joint_count();
     let best = (0..joints).filter_map(of_joint).max_by(|a, b| a.0.total_cmp(&b.0));
-    let (explained, joint, chance, Some(amount)) = best? else { return None };
+    let (explained, joint, chance, amounts) = best?;
+    let amount = median(amounts.iter().map(|(amount, _)| amount.abs()))?;
     // What goes one way in the sensor's frame is the sensor's.
     let of_sensor =
         here.iter().map(|e| e.normalize() * e.normalize().transpose()).sum::<Matrix3<f64>>() / here.len() as f64;
@@ -175,10 +215,10 @@ fn along(of: &Rows, errors: &dyn Fn(&Dataset) -> Vec<RowError>) -> Option<Findin
     let (amount, unit) = of.shown(joint, amount);
     let all = of.fitted.len() + of.outliers.len();
     let said = format!(
-        "{} of {all} rows were left out, and their errors are alike: as if joint {} stood elsewhere in them, by {amount:.2} {unit} in the median \
+        "{} of {all} rows were left out, and their errors are alike: as if {} in them, by {amount:.2} {unit} in the median \
          ({:.0} % of their squares); that is no gross error, and the robot that was found does not hold there",
         here.len(),
-        joint + 1,
+        of.cause(joint, &amounts),
         100.0 * explained,
     );
     Some(finding(of.set, said, joint, of.outliers.to_vec()))
@@ -233,7 +273,7 @@ mod tests {
         }
         let set = Dataset::new(&world.rows).unwrap();
         let fitted: Vec<usize> = (0..set.poses.len()).filter(|row| !outliers.contains(row)).collect();
-        of_a_joint(&set, &fitted, outliers, &|_| Vec::new())
+        of_a_joint(&set, &world.nominal, &fitted, outliers, &|_| Vec::new())
     }
 
     #[test]
@@ -261,7 +301,25 @@ mod tests {
         world.rows.iter_mut().zip(0..).for_each(|(row, k)| spoil(row, k));
         let (set, found) = world.identified(&world.rows);
         let errors = |set: &Dataset| Judge::plain(set, &found.fitted, false).errors(found.robot(), &found.outliers);
-        (of_a_joint(&set, &found.fitted, &found.outliers, &errors), found.outliers.len())
+        (of_a_joint(&set, found.robot(), &found.fitted, &found.outliers, &errors), found.outliers.len())
+    }
+
+    /// A weight turns a joint by as much as its torque about it; an arm that does not move far from its load's side tells no two apart.
+    #[test]
+    fn a_load_in_some_rows_is_named_and_not_a_joint_alone() {
+        let robot = Robot::paper();
+        for (joint, size) in [(1, 20.0), (2, 20.0), (2, 60.0)] {
+            let (said, count) = said_of_world(|row, k| {
+                if row.at.role == Role::Sample && k % 7 == 2 {
+                    let q = row.at.joints_rad();
+                    let by = |p: Parameter| robot.shifted(&[p], &[1.0]).target_mm(&q) - robot.target_mm(&q);
+                    let (turn, load) = (by(Parameter::Theta(joint)), by(Parameter::Gravity(joint, LoadPoint::Tool)));
+                    row.at.joints_deg[joint] -= size * (1e-3 * turn.dot(&load) / turn.norm_squared()).to_degrees();
+                }
+            });
+            let said = said.unwrap_or_else(|| panic!("joint {joint}: {count} left out"));
+            assert!(said.finding.contains(&format!("a load bent joint {}", joint + 1)), "{said:?}");
+        }
     }
 
     #[test]

@@ -193,12 +193,13 @@ pub(super) fn estimate_scatter(
     };
     let left = wanted / of_points.max(1.0);
     let scatter = Scatter { rotation_rad, ..most_probable(&residuals, before, left, &excess) };
-    Scatter { hidden_mm2: hidden_mm2(&residuals, left, &scatter), ..scatter }
+    let (hidden_mm2, fresh_sd_mm2) = hidden(&residuals, left, &scatter);
+    Scatter { hidden_mm2, fresh_sd_mm2, freedom: wanted, ..scatter }
 }
 
-/// By how much the expectation of the scatter's variance is above the one that was found: residuals tell it to within a standard deviation that the
-/// readings' own noise makes, and it is not negative. `left` is the share of the numbers that the fit left.
-fn hidden_mm2(residuals: &[Residual], left: f64, scatter: &Scatter) -> f64 {
+/// By how much the expectation of the scatter's variance is above the one that was found, and its standard deviation, mm^2: residuals tell it to within
+/// one that the readings' own noise makes, and it is not negative. `left` is the share of the numbers that the fit left.
+fn hidden(residuals: &[Residual], left: f64, scatter: &Scatter) -> (f64, f64) {
     let (mut score, mut information) = (0.0, 0.0);
     for residual in residuals {
         for number in residual.numbers() {
@@ -212,10 +213,12 @@ fn hidden_mm2(residuals: &[Residual], left: f64, scatter: &Scatter) -> f64 {
     // Where none was found, residuals that are smaller than the readings' noise ask for less than none.
     let most_probable = if scatter.point_mm > LEAST_MM { found } else { (score / information).min(0.0) };
     let z = (most_probable / sd).max(FARTHEST);
-    let Ok(law) = Normal::new(0.0, 1.0) else { return 0.0 };
-    // The mean of a normal number that is known not to be negative.
-    let above = sd * (z + law.pdf(z) / law.cdf(z)) - found;
-    if above.is_finite() { above.max(0.0) } else { 0.0 }
+    let law = Normal::standard();
+    // Mean and variance of a normal number that is known not to be negative.
+    let cut = law.pdf(z) / law.cdf(z);
+    let above = sd * (z + cut) - found;
+    let sd = sd * (1.0 - cut * (z + cut)).max(0.0).sqrt();
+    if above.is_finite() { (above.max(0.0), sd) } else { (0.0, 0.0) }
 }
 
 /// The scatter of a coordinate at which nothing is in excess, the factor of the stated covariances held.

@@ -17,7 +17,7 @@ use super::moved::{self, Moved};
 use super::sorter::{Judged, Shown, Sorter};
 use crate::identify::Error;
 use crate::identify::finding::Finding;
-use crate::identify::sensor::Extra;
+use crate::identify::sensor::{Extra, REPEATABILITY_MM};
 use crate::measurements::{Measurement, Observed};
 
 /// Variance that a stated covariance has in each direction at the least, as a share of its largest.
@@ -39,6 +39,9 @@ pub struct Targets {
     pub oriented: bool,
     /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that stands, mm.
     pub parts: BTreeMap<String, Part>,
+    /// Targets that moved by less than a robot repeats to: nothing was done about them.
+    #[serde(skip)]
+    pub slightly_moved: Option<String>,
     /// What was wrong at single poses.
     #[serde(skip)]
     pub findings: Vec<Finding>,
@@ -69,7 +72,7 @@ impl Targets {
             0 => String::new(),
             1 => "; 1 pose shows fewer: what it shows is a point of the body".to_owned(),
             n => format!("; {n} poses show fewer: what they show is a point of the body"),
-        }
+        } + &self.slightly_moved.as_ref().map_or_else(String::new, |moved| format!("; {moved}"))
     }
 
     /// The same with the places as they were solved: the unknowns of [`super::Joined::columns`], by the parts in the order of their names.
@@ -112,7 +115,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
     }
     let stated = rows.iter().all(|r| !matches!(r.observed, Observed::Position { covariance_mm2: None, .. }));
     let mut poses = shown(rows, &names, stated);
-    let moved = told_apart(&mut poses, &mut names);
+    let (moved, slightly_moved) = told_apart(&mut poses, &mut names);
     let seen = sightings(&poses);
     let body = Body::new(&seen, names.len()).ok_or_else(|| Error::Targets {
         message: format!("the rows are of {} targets ({}), but no pose shows two of them", names.len(), names.join(", ")),
@@ -146,6 +149,7 @@ pub fn as_one(rows: &[Measurement]) -> Result<Option<(Vec<Measurement>, Targets)
         oriented: !sorter.body.is_line(),
         names,
         parts,
+        slightly_moved,
         findings,
     };
     Ok(Some((rows, targets)))
@@ -177,19 +181,29 @@ fn sightings(poses: &[Shown]) -> Vec<Vec<Sighting>> {
     poses.iter().map(|pose| pose.sightings.clone()).collect()
 }
 
-/// Makes targets that moved others from there on; each with the index that it has from there on.
-fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> Vec<(Moved, usize)> {
+/// Makes targets that moved others from there on; each with the index that it has from there on. One that moved by less than a robot repeats to
+/// stays what it is, and what is said of it is the other: as another target it would cost orientations, and as the same one hardly anything.
+fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> (Vec<(Moved, usize)>, Option<String>) {
     let mut list = Vec::new();
     let most = names.len();
     while list.len() < most {
-        let Some(moved) = moved::next(&sightings(poses), names.len()) else { break };
+        let seen = sightings(poses);
+        let Some(moved) = moved::next(&seen, names.len()) else { break };
+        let size_mm = moved::size_mm(&seen, names.len(), moved);
+        if size_mm < REPEATABILITY_MM {
+            let (name, pose) = (&names[moved.target], &poses[moved.from].first.at.pose);
+            let said = format!(
+                "target {name} stands {size_mm:.4} mm elsewhere from {pose} on, less than a robot repeats to, and is used all the same"
+            );
+            return (list, Some(said));
+        }
         let new = names.len();
         names.push(format!("{} from {} on", names[moved.target], poses[moved.from].first.at.pose));
         let later = poses[moved.from..].iter_mut().flat_map(|pose| &mut pose.sightings);
         later.filter(|s| s.target == moved.target).for_each(|s| s.target = new);
         list.push((moved, new));
     }
-    list
+    (list, None)
 }
 
 /// Of a covariance that may be singular.

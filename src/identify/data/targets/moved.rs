@@ -33,6 +33,17 @@ pub struct Moved {
     pub from: usize,
 }
 
+/// By how much a target's distances to the others change there at the most, mm.
+pub fn size_mm(poses: &[Vec<Sighting>], targets: usize, moved: Moved) -> f64 {
+    let of_pair = |other: usize| {
+        let (before, after): (Vec<_>, Vec<_>) =
+            distances(poses, moved.target, other).into_iter().partition(|(pose, _)| *pose < moved.from);
+        let [before, after] = [before, after].map(|part| median(part.into_iter().map(|(_, apart)| apart)));
+        Some((after? - before?).abs())
+    };
+    (0..targets).filter(|other| *other != moved.target).filter_map(of_pair).fold(0.0, f64::max)
+}
+
 /// The step that is looked at next, if there is any.
 pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
     let mut of_target = vec![(0, 0.0, 0); targets];

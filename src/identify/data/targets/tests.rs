@@ -138,10 +138,15 @@ fn exchanged_names_are_mended() {
 
 /// Rows of so many targets, one of which stands elsewhere by so much from a pose on.
 fn rows_with_moved(count: usize, seed: u64, from: usize, by_mm: f64) -> Vec<Measurement> {
+    read_with_moved(count, seed, from, by_mm, NOISE_MM)
+}
+
+/// The same with another noise of a coordinate, mm.
+fn read_with_moved(count: usize, seed: u64, from: usize, by_mm: f64, noise_mm: f64) -> Vec<Measurement> {
     let mut later = TARGETS;
     later[2].1 += by_mm * Vector3::new(0.6, -0.7, 0.4);
     let world = synthetic::world(40, 0.0, seed);
-    let [before, after] = [TARGETS, later].map(|t| synthetic::of_targets(&world, &t[..count], NOISE_MM, seed));
+    let [before, after] = [TARGETS, later].map(|t| synthetic::of_targets(&world, &t[..count], noise_mm, seed));
     before[..count * from].iter().chain(&after[count * from..]).cloned().collect()
 }
 
@@ -164,6 +169,18 @@ fn a_target_that_moved_is_named_and_counts_as_another() {
         assert!(named && sentence.contains("left out"), "{by_mm} {from}: {sentence}");
         let kept = poses.iter().filter(|p| matches!(p.observed, Observed::Position { .. })).count();
         assert_eq!(kept, poses.len(), "{by_mm} {from}");
+    }
+}
+
+/// A tracker sees a micrometre; what moves by less than the robot repeats to costs no orientation and no doubt.
+#[test]
+fn a_target_that_moved_by_next_to_nothing_is_used_all_the_same() {
+    for (count, by_mm) in [(3, 0.004), (3, 0.01), (4, 0.004)] {
+        let (poses, targets) = one(&read_with_moved(count, 6, 20, by_mm, 0.0008));
+        assert!(targets.findings.is_empty(), "{count} {by_mm}: {:?}", targets.findings);
+        assert!(targets.sentence().contains("target c stands"), "{count} {by_mm}: {}", targets.sentence());
+        let whole = |pose: &&Measurement| matches!(pose.observed, Observed::Position { rotation_rad: Some(_), .. });
+        assert_eq!(poses.iter().filter(whole).count(), poses.len(), "{count} {by_mm}");
     }
 }
 

@@ -52,7 +52,7 @@ impl Compared<'_> {
         let (off, columns) = left_over(&linear, self.count);
         let known: Vec<usize> = (0..self.before.parameters.len()).collect();
         let of_old = columns.select_columns(&known) * root(&self.before.covariance);
-        let difference = Difference::of_white(off, of_old, self.before.poses)?;
+        let difference = Difference::of_white(off, of_old, self.before.freedom)?;
         Some((linear, Look { difference, columns }))
     }
 

@@ -75,7 +75,8 @@ impl Comparison<'_> {
         let named = |(_, suspect, amounts): &(f64, &Suspect, Vec<f64>)| (suspect.word.clone(), suspect.by(amounts));
         let likeliest = explained.iter().map(named).collect();
         let placements = if changed { Vec::new() } else { placements(self.set, compared, &linear, self.stood) };
-        let seen_mm = causes.iter().filter_map(|c| c.seen_mm).fold(0.0, f64::max);
+        let most = |of: fn(&CauseSeen) -> Option<f64>| causes.iter().filter_map(of).fold(0.0, f64::max);
+        let (seen_mm, at_most_mm) = (most(|c| c.seen_mm), most(|c| c.at_most_mm));
         let effect_mm = match (changed, explained.first()) {
             (true, Some((_, suspect, amounts))) => moves.most_mm(&suspect.columns, amounts),
             (true, None) => compared.misfit_mm(),
@@ -96,6 +97,7 @@ impl Comparison<'_> {
             placements,
             effect_mm,
             seen_mm,
+            at_most_mm,
             by_cameras,
             correction_mm,
             extrapolated,

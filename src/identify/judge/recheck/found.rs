@@ -25,6 +25,8 @@ pub struct Before {
     pub along: BTreeMap<String, f64>,
     /// Poses that this was found from.
     pub poses: usize,
+    /// Degrees of freedom that tell how large the scatter is.
+    pub freedom: f64,
     /// What 95 % of its position errors were stated to be below, mm.
     pub p95_mm: f64,
 }
@@ -47,6 +49,8 @@ pub struct CauseSeen {
     pub seen: Option<f64>,
     /// By how much that one moves the target, mm.
     pub seen_mm: Option<f64>,
+    /// By how much it moves the target at the most, if it alone changed: with a chance of nineteen in twenty, mm.
+    pub at_most_mm: Option<f64>,
 }
 
 /// How one placement stands against the old one.
@@ -79,6 +83,8 @@ pub struct Recheck {
     pub effect_mm: f64,
     /// The largest movement of the target that a single cause could make without being seen, mm.
     pub seen_mm: f64,
+    /// The largest movement of the target by a single cause that the poses leave room for, mm.
+    pub at_most_mm: f64,
     /// Whether the points are those of cameras, or another instrument's.
     pub by_cameras: bool,
     /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what was identified, as much may be off.
@@ -114,6 +120,13 @@ impl Recheck {
             [one] => Some(format!("row {one} fits far worse than the rest: take it again")),
             all => Some(format!("rows {} fit far worse than the rest: take them again", all.join(", "))),
         }
+    }
+
+    /// What the poses see nothing of, for a person; `None` where they see of everything.
+    pub fn unseen(&self) -> Option<String> {
+        let unseen = self.causes.iter().filter(|cause| cause.amount.is_none()).map(|cause| cause.what.as_str());
+        let unseen = unseen.collect::<Vec<_>>();
+        (!unseen.is_empty()).then(|| unseen.join(", "))
     }
 
     /// What changed, for a person.

@@ -18,6 +18,9 @@ const UNSEEN: f64 = 1e-4;
 /// A turn that must be larger than this to be seen, rad, is not seen either: up to here a turn moves points along its column to half a hundredth.
 const LINEAR_RAD: f64 = 0.1;
 
+/// Chance that a cause is larger than it is said to be at the most.
+const MISSED: f64 = 0.05;
+
 /// Rounds of looking anew where a suspect says that the robot is: a large turn is not linear.
 const ROUNDS: usize = 3;
 
@@ -72,6 +75,7 @@ impl<'a> Looks<'a> {
             effect_mm: amount.map_or(0.0, |(amount, _)| unit_mm * amount.abs()),
             seen,
             seen_mm: seen.map(|seen| unit_mm * seen),
+            at_most_mm: amount.map(|(amount, sigma)| unit_mm * (amount.abs() + difference.level(2.0 * MISSED) * sigma)),
         }
     }
 

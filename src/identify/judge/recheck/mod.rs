@@ -21,9 +21,9 @@ mod tests;
 pub use along::variances_along;
 pub use comparison::Stood;
 pub use found::{Before, CauseSeen, Moved, Recheck};
+pub use suspects::zero;
 
 use self::comparison::Comparison;
-use self::suspects::zero;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::locate::FEWEST_POSES;

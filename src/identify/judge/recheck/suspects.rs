@@ -18,7 +18,7 @@ fn suspect(word: &str, words: &str, unit: &'static str, columns: Vec<(usize, f64
 }
 
 /// The zero of a joint.
-pub(super) fn zero(robot: &Robot) -> impl Fn(usize) -> Parameter + '_ {
+pub fn zero(robot: &Robot) -> impl Fn(usize) -> Parameter + '_ {
     |joint| if robot.joints[joint].slides { Parameter::D(joint) } else { Parameter::Theta(joint) }
 }
 

@@ -5,6 +5,7 @@ use rand_pcg::Pcg64Mcg;
 use super::*;
 use crate::identify::judge::locate::Trust;
 use crate::identify::judge::placement::Uncertain;
+use crate::identify::judge::uncertainty::Expected;
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Settings};
 use crate::identify::synthetic;
@@ -43,7 +44,8 @@ fn cell(oriented: bool, seed: u64) -> Cell {
         trust: Trust { point_mm: scatter.point_mm, rotation_rad: oriented.then_some(scatter.rotation_rad) },
         along: variances_along(formulation).into_iter().collect(),
         poses: set.poses.len(),
-        p95_mm: 0.1,
+        freedom: scatter.freedom,
+        p95_mm: Expected::new(formulation, &set, &identified.fitted).p95_mm,
     };
     Cell { truth: world.truth, found: identified.robot().clone(), before }
 }
@@ -92,6 +94,27 @@ fn robots_that_did_not_change_raise_an_alarm_as_often_as_stated() {
     }
     // One in a hundred in each: nine or more in two hundred have a chance of one in four thousand.
     assert!(alarms < 9, "{alarms} of 200");
+}
+
+/// By what ten poses tell, against what 95 % of the errors were stated to be below.
+#[test]
+fn unchanged_robots_are_the_same_and_one_that_is_off_by_the_tolerance_is_not() {
+    let is_same = |cell: &Cell, found: &Recheck| !found.changed && found.at_most_mm <= cell.before.p95_mm;
+    let parameters = [Parameter::Theta(1), Parameter::Theta(2), Parameter::Theta(3), Parameter::Theta(4)];
+    let (mut same, mut passed) = (0, 0);
+    for seed in 0..10 {
+        let cell = cell(seed % 2 == 0, seed);
+        for (k, parameter) in (0..4).zip(parameters) {
+            let seed = 300 + 10 * seed + k;
+            let clean = cell.check(&|_| {}, 1.0, seed);
+            same += usize::from(is_same(&cell, &clean));
+            let cause = clean.causes.iter().find(|c| c.cause == format!("joint-{}", k + 2)).unwrap();
+            let unit_mm = cause.seen_mm.unwrap() / cause.seen.unwrap();
+            let off = cell.before.p95_mm / unit_mm / parameter.file_unit().1;
+            passed += usize::from(is_same(&cell, &cell.check(&|robot| robot.add(parameter, off), 1.0, seed)));
+        }
+    }
+    assert!(same >= 36 && passed <= 4, "{same} the same and {passed} that are off, of 40");
 }
 
 #[test]
