@@ -1,9 +1,9 @@
 //! What some rows say of the old robot.
 
 use super::compared::{Compared, Look, rows};
-use super::found::{Before, CauseSeen, Recheck};
+use super::found::{Before, CauseSeen, Moved, Recheck};
 use super::looks::Looks;
-use super::moves::{Moves, placements};
+use super::moves::{Moves, Off, placements};
 use super::suspects::{Suspect, suspects};
 use crate::difference::Difference;
 use crate::identify::Error;
@@ -72,21 +72,23 @@ impl Comparison<'_> {
             suspects.iter().filter(|s| s.columns.len() == 1).map(|s| looks.of(s, &moves)).collect();
         let changed = looks.is_change();
         let explained = if changed { looks.explained() } else { Vec::new() };
-        let named = |(_, suspect, amounts): &(f64, &Suspect, Vec<f64>)| (suspect.word.clone(), suspect.by(amounts));
+        let named = |(_, suspect, off): &(f64, &Suspect, Off)| (suspect.word.clone(), suspect.by(&off.amounts));
         let likeliest = explained.iter().map(named).collect();
-        let placements = if changed { Vec::new() } else { placements(self.set, compared, &linear, self.stood) };
+        let placements = self.placements(compared, changed, explained.iter().map(|(.., off)| off));
         let most = |of: fn(&CauseSeen) -> Option<f64>| causes.iter().filter_map(of).fold(0.0, f64::max);
         let (seen_mm, at_most_mm) = (most(|c| c.seen_mm), most(|c| c.at_most_mm));
-        let effect_mm = match (changed, explained.first()) {
-            (true, Some((_, suspect, amounts))) => moves.most_mm(&suspect.columns, amounts),
-            (true, None) => compared.misfit_mm(),
+        // Cameras that are said to stand as before do not take up what the robot is off.
+        let in_base_mm = explained.iter().map(|(.., off)| moves.in_base_mm(&off.columns, &off.amounts));
+        let effect_mm = match (changed, explained.is_empty()) {
+            (true, false) => in_base_mm.fold(0.0, f64::max),
+            (true, true) => compared.misfit_mm(),
             (false, _) => 0.0,
         };
         let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
         let likelihood = explained.first().map(|(likelihood, ..)| *likelihood);
         let (poses, by_cameras) = (self.set.names(used), self.set.is_of_cameras());
         let (columns, amounts) = self.before.corrected();
-        let correction_mm = moves.most_mm(&columns, &amounts);
+        let correction_mm = moves.in_base_mm(&columns, &amounts);
         let (strays, extrapolated) = (Vec::new(), Vec::new());
         let recheck = Recheck {
             poses,
@@ -103,5 +105,20 @@ impl Comparison<'_> {
             extrapolated,
         };
         Some(Said { recheck, difference: looks.look.difference, likelihood })
+    }
+
+    /// Each placement against where it stood: moved where it did whichever of the causes it was. Of a change that nothing explains they tell nothing.
+    fn placements<'a>(&self, compared: &Compared, changed: bool, causes: impl Iterator<Item = &'a Off>) -> Vec<Moved> {
+        let placed = |off: &Off| placements(self.set, compared, off, self.stood);
+        if !changed {
+            return placed(&Off::nothing());
+        }
+        let of_causes: Vec<Vec<Moved>> = causes.map(placed).collect();
+        let Some((first, others)) = of_causes.split_first() else { return Vec::new() };
+        let in_all = |group: &str| {
+            others.iter().all(|list| list.iter().any(|placement| placement.group == group && placement.moved))
+        };
+        let each = first.iter().cloned();
+        each.map(|placement| Moved { moved: placement.moved && in_all(&placement.group), ..placement }).collect()
     }
 }

@@ -79,7 +79,7 @@ pub struct Recheck {
     pub likeliest: Vec<(String, String)>,
     /// Placements that are in the old file.
     pub placements: Vec<Moved>,
-    /// By how much the change moves the target, mm.
+    /// By how much the change moves the target, in the base, mm.
     pub effect_mm: f64,
     /// The largest movement of the target that a single cause could make without being seen, mm.
     pub seen_mm: f64,
@@ -147,7 +147,14 @@ impl Recheck {
         }
         match (self.changed, self.likeliest.is_empty()) {
             (true, true) => "the robot changed, and no single cause explains how".to_owned(),
-            (true, false) => self.likeliest.iter().map(|(_, words)| words.as_str()).collect::<Vec<_>>().join(", or "),
+            (true, false) => {
+                let causes = self.likeliest.iter().map(|(_, words)| words.as_str()).collect::<Vec<_>>().join(", or ");
+                let whose = if self.by_cameras { "the cameras" } else { "the instrument" };
+                match moved.is_empty() {
+                    true => causes,
+                    false => format!("{causes}; and {whose} moved, or the zero of joint 1: {}", moved.join(", ")),
+                }
+            }
             (false, _) if !moved.is_empty() => {
                 let stands = if self.by_cameras { "the cameras stand" } else { "the instrument stands" };
                 format!("the robot is the same; {stands} elsewhere, or the zero of joint 1 moved: {}", moved.join(", "))

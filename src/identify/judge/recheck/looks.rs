@@ -3,11 +3,11 @@
 //! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and those that explain a change.
 //! Goes wrong: causes with the same columns are not told apart, and named together.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use super::compared::Look;
 use super::found::{CauseSeen, FALSE_ALARM};
-use super::moves::Moves;
+use super::moves::{Moves, Off};
 use super::suspects::Suspect;
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::tables::names::Unit;
@@ -91,14 +91,14 @@ impl<'a> Looks<'a> {
     }
 
     /// Suspects that leave no more than chance and are not told apart, the likeliest first, with the logarithm of their likelihood and their numbers.
-    pub(super) fn explained(&self) -> Vec<(f64, &'a Suspect, Vec<f64>)> {
+    pub(super) fn explained(&self) -> Vec<(f64, &'a Suspect, Off)> {
         let count = self.look.difference.off.len();
-        let mut explain: Vec<(f64, &'a Suspect, Vec<f64>)> = Vec::new();
+        let mut explain: Vec<(f64, &'a Suspect, Off)> = Vec::new();
         for suspect in self.suspects.iter().filter(|s| self.is_seen(s)) {
             let numbers = suspect.columns.len();
-            let Some((left, difference, amounts)) = self.left_by(suspect) else { continue };
+            let Some((left, difference, off)) = self.left_by(suspect) else { continue };
             if left <= difference.limit(count - numbers, self.chance()) {
-                explain.push((difference.log_likelihood(left) - price(count, numbers), suspect, amounts));
+                explain.push((difference.log_likelihood(left) - price(count, numbers), suspect, off));
             }
         }
         explain.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -107,7 +107,7 @@ impl<'a> Looks<'a> {
     }
 
     /// What is left of the residuals where a suspect may take what it likes, and what it takes.
-    fn left_by(&self, suspect: &Suspect) -> Option<(f64, Difference, Vec<f64>)> {
+    fn left_by(&self, suspect: &Suspect) -> Option<(f64, Difference, Off)> {
         let mut offsets = vec![0.0; self.look.columns.ncols()];
         let mut total = DVector::zeros(suspect.columns.len());
         let mut again = None;
@@ -118,15 +118,19 @@ impl<'a> Looks<'a> {
             again = Some((self.again)(&offsets)?);
         }
         let look = again?;
-        let left = look.difference.left_by(&look.directions(suspect))?;
-        Some((left, look.difference, total.iter().copied().collect()))
+        let directions = look.directions(suspect);
+        let left = look.difference.left_by(&directions)?;
+        let numbers = directions.len();
+        let information =
+            DMatrix::from_fn(numbers, numbers, |i, j| look.difference.product(&directions[i], &directions[j]));
+        let covariance = information.try_inverse()? * suspect.variance;
+        let off = Off { columns: suspect.columns.clone(), amounts: total.iter().copied().collect(), covariance };
+        Some((left, look.difference, off))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::DMatrix;
-
     use super::*;
 
     /// Whether twelve residuals that are known to `sigma` show anything of a cause that adds its amount to each.

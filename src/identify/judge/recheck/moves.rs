@@ -1,4 +1,4 @@
-//! How far a change of the robot moves the target, once the placements were found anew; and each placement against where it stood.
+//! How far a change of the robot moves the target, in the base and once the placements were found anew; and each placement against where it stood.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -12,8 +12,13 @@ use crate::identify::residuals::eliminate::{Block, Linear, Unknowns};
 use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::linear_algebra::{product, pseudo_inverse, without};
 
-/// How far offsets move the target at each pose of each placement in mm, after that was found anew.
-pub(super) struct Moves(Vec<DMatrix<f64>>);
+/// How far offsets move the target at each pose of each placement, mm.
+pub(super) struct Moves {
+    /// After the placement was found anew.
+    anew: Vec<DMatrix<f64>>,
+    /// In the base. A scale is the sensor's: no more than is left of it by the placement.
+    in_base: Vec<DMatrix<f64>>,
+}
 
 impl Moves {
     pub(super) fn new(linear: &Linearised, count: usize) -> Moves {
@@ -29,33 +34,67 @@ impl Moves {
                 columns.view_mut((3 * k, robot), (3, 1)).copy_from(&(1e-3 * place.point_mm.coords));
                 rigid.view_mut((3 * k, 0), (3, 6)).copy_from(&rigid_columns(&place.point_mm.coords));
             }
-            without(&columns, &rigid)
+            let anew = without(&columns, &rigid);
+            columns.set_column(robot, &anew.column(robot));
+            (anew, columns)
         };
-        Moves(linear.placements.iter().map(of_placement).collect())
+        let (anew, in_base) = linear.placements.iter().map(of_placement).unzip();
+        Moves { anew, in_base }
     }
 
-    /// The largest of all poses, mm.
+    /// The largest of all poses after the placements were found anew, mm.
     pub(super) fn most_mm(&self, columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
-        let of_placement = |moves: &DMatrix<f64>| {
-            let mut moved = DVector::zeros(moves.nrows());
-            for ((at, unit), amount) in columns.iter().zip(amounts) {
-                moved += moves.column(*at) * (unit * amount);
-            }
-            (0..moved.len() / 3).map(|k| moved.rows(3 * k, 3).norm()).fold(0.0, f64::max)
-        };
-        self.0.iter().map(of_placement).fold(0.0, f64::max)
+        most_mm(&self.anew, columns, amounts)
+    }
+
+    /// The largest of all poses in the base, where programs move the target, mm.
+    pub(super) fn in_base_mm(&self, columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
+        most_mm(&self.in_base, columns, amounts)
     }
 }
 
-/// Each placement against where it stood.
+fn most_mm(moves: &[DMatrix<f64>], columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
+    let of_placement = |moves: &DMatrix<f64>| {
+        let mut moved = DVector::zeros(moves.nrows());
+        for ((at, unit), amount) in columns.iter().zip(amounts) {
+            moved += moves.column(*at) * (unit * amount);
+        }
+        (0..moved.len() / 3).map(|k| moved.rows(3 * k, 3).norm()).fold(0.0, f64::max)
+    };
+    moves.iter().map(of_placement).fold(0.0, f64::max)
+}
+
+/// A robot that is off by some offsets, each known to so much together, in units of the file.
+pub(super) struct Off {
+    /// Index of the column, and what one unit of the file is in it.
+    pub(super) columns: Vec<(usize, f64)>,
+    pub(super) amounts: Vec<f64>,
+    pub(super) covariance: DMatrix<f64>,
+}
+
+impl Off {
+    /// As it was.
+    pub(super) fn nothing() -> Off {
+        Off { columns: Vec::new(), amounts: Vec::new(), covariance: DMatrix::zeros(0, 0) }
+    }
+
+    fn offsets(&self, count: usize) -> Vec<f64> {
+        let mut offsets = vec![0.0; count];
+        self.columns.iter().zip(&self.amounts).for_each(|(&(at, unit), amount)| offsets[at] = unit * amount);
+        offsets
+    }
+}
+
+/// Each placement against where it stood, with a robot that is off by so much.
 pub(super) fn placements(
     set: &Dataset,
     compared: &Compared,
-    linear: &Linearised,
+    off: &Off,
     stood: &dyn Fn(&str) -> Option<Uncertain>,
 ) -> Vec<Moved> {
     let Compared { rows, before, count } = *compared;
-    let offsets = compared.offsets(&vec![0.0; count]);
+    let offsets = compared.offsets(&off.offsets(count));
+    let linear = Linearised::new(rows, &offsets);
     let mut list = Vec::new();
     for ((block, unknowns), placement) in rows.blocks.iter().zip(rows.unknowns(&offsets)).zip(&linear.placements) {
         let (Block::Points(points), Unknowns::Frame(frame)) = (block, unknowns) else { continue };
@@ -63,7 +102,7 @@ pub(super) fn placements(
         let name = &set.groups[set.poses[rows.rows[spot.pose]].group].name;
         let Some(old) = stood(name) else { continue };
         let covariance =
-            of_frame(placement, count, before) + DMatrix::from_iterator(6, 6, old.covariance.iter().copied());
+            of_frame(placement, count, before, off) + DMatrix::from_iterator(6, 6, old.covariance.iter().copied());
         let turn = rotation_vector(&(frame * old.transform.inverse()));
         let shift = frame.translation.vector - old.transform.translation.vector;
         let off = DVector::from_iterator(6, turn.iter().chain(shift.iter()).copied());
@@ -84,8 +123,8 @@ pub(super) fn placements(
     list
 }
 
-/// Covariance of a frame, the target's turn found with it, and what is uncertain of the old robot in it.
-fn of_frame(placement: &Placement, count: usize, before: &Before) -> DMatrix<f64> {
+/// Covariance of a frame, the target's turn found with it, and what is uncertain of the old robot and of its change in it.
+fn of_frame(placement: &Placement, count: usize, before: &Before, off: &Off) -> DMatrix<f64> {
     let Linear { jacobian, design, .. } = &*placement.linear;
     let turns = jacobian.ncols() - count;
     let mut own = design.clone().resize_horizontally(6 + turns, 0.0);
@@ -93,6 +132,13 @@ fn of_frame(placement: &Placement, count: usize, before: &Before) -> DMatrix<f64
     let inverse = pseudo_inverse(product(&own, &own));
     let known = jacobian.columns(0, before.parameters.len()).into_owned();
     let follow = -(&inverse * product(&own, &known));
-    let covariance = inverse + &follow * &before.covariance * follow.transpose();
+    let changed = DMatrix::from_fn(jacobian.nrows(), off.columns.len(), |row, k| {
+        let (at, unit) = off.columns[k];
+        jacobian[(row, at)] * unit
+    });
+    let with_change = -(&inverse * product(&own, &changed));
+    let covariance = inverse
+        + &follow * &before.covariance * follow.transpose()
+        + &with_change * &off.covariance * with_change.transpose();
     covariance.view((0, 0), (6, 6)).into_owned()
 }

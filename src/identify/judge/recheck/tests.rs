@@ -183,6 +183,36 @@ fn cameras_that_stand_elsewhere_are_said_while_the_robot_is_the_same() {
     assert!(moved <= 1, "{moved} of 10");
 }
 
+#[test]
+fn a_joint_that_changed_is_off_in_the_base_and_hides_no_cameras_that_moved() {
+    for seed in 0..6 {
+        let cell = cell(seed % 2 == 0, seed);
+        let stood = |shift_mm: f64| {
+            let first = |robot: &Robot| robot.joints[0].previous_from_this(0.0);
+            let mut transform = synthetic::sensor(2) * first(&cell.truth) * first(&cell.found).inverse();
+            transform.translation.vector.x += shift_mm;
+            Uncertain { transform, covariance: nalgebra::Matrix6::identity() * 1e-9 }
+        };
+        for (joint, deg) in [(1, 0.2), (2, 0.1), (4, 0.2)] {
+            let fault = |robot: &mut Robot| robot.add(Parameter::Theta(joint), f64::to_radians(deg) * 1e3);
+            let set = Dataset::new(&cell.rows(&fault, 10, 500 + seed)).unwrap();
+            let mut spoilt = cell.truth.clone();
+            fault(&mut spoilt);
+            let off = |pose: &crate::identify::data::dataset::Pose| {
+                (spoilt.target_mm(&pose.joints_rad) - cell.truth.target_mm(&pose.joints_rad)).norm()
+            };
+            let true_mm = set.poses.iter().map(off).fold(0.0, f64::max);
+            for shift_mm in [0.0, 7.0] {
+                let found = recheck(&set, &cell.found, &cell.before, &|_| Some(stood(shift_mm))).unwrap();
+                let said = format!("{seed}, joint {}, {shift_mm} mm: {}", joint + 1, found.statement());
+                assert!(found.cause().contains(&format!("joint-{}", joint + 1)), "{said}");
+                assert!((0.7..1.5).contains(&(found.effect_mm.min(7.0) / true_mm.max(shift_mm))), "{said}: {found:?}");
+                assert_eq!(found.statement().contains("moved, or the zero of joint 1"), shift_mm > 0.0, "{said}");
+            }
+        }
+    }
+}
+
 /// Names of the rows at these places.
 fn names(cell: &Cell, count: usize, seed: u64, at: &[usize]) -> Vec<String> {
     let rows = cell.rows(&|_| {}, count, seed);
