@@ -153,11 +153,14 @@ impl Scatter {
     }
 
     /// Degrees of freedom of a mean square that is to be expected of fresh poses, of which so large a share is their own scatter: the rest follows from
-    /// readings that are as large as the residuals say (Satterthwaite, 1946). At the least two, of which a mean can be told.
+    /// readings that are as large as the residuals say (Satterthwaite, 1946). What covariances state is known, and what they hide is there by its
+    /// expectation already. At the least two, of which a mean can be told.
     pub fn freedom_of(&self, share_of_fresh: f64) -> f64 {
-        let of_fresh = share_of_fresh * self.fresh_sd_mm2 / self.fresh_mm2().max(f64::MIN_POSITIVE);
+        let fresh_mm2 = self.fresh_mm2().max(f64::MIN_POSITIVE);
+        let told = if self.stated == 1.0 { self.point_mm * self.point_mm / fresh_mm2 } else { 1.0 };
+        let of_fresh = share_of_fresh * self.fresh_sd_mm2 / fresh_mm2;
         let of_rest = (1.0 - share_of_fresh) * (2.0 / self.freedom).sqrt();
-        (2.0 / (of_fresh + of_rest).powi(2)).max(2.0)
+        (2.0 / (told * (of_fresh + of_rest)).powi(2)).max(2.0)
     }
 
     /// Whole covariance of a point, mm^2.

@@ -287,7 +287,7 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     let fresh: Vec<String> = new.iter().map(|line| (*line).to_owned()).collect();
     std::fs::write(at.join("mixed.csv"), of_rows(&[&renamed[..], &fresh[..]].concat())).unwrap();
     let mixed = check("mixed.csv", "5");
-    assert!(mixed.status.code() == Some(0) && stdout(&mixed).contains("; 10 poses would"), "{}", stdout(&mixed));
+    assert!(mixed.status.code() == Some(0) && stdout(&mixed).contains("; these 10 poses"), "{}", stdout(&mixed));
     assert!(stderr(&mixed).contains("12 of these 22 rows, which are left out"), "{}", stderr(&mixed));
     // One misread coordinate is no change of the robot.
     let x = header.split(',').position(|name| name == "x_mm").unwrap();

@@ -106,8 +106,8 @@ fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::
     let Examined { set, robot: mended, along, findings, against, unexplained } =
         examine::examine(set, robot, settings, &|_| {});
     let is_sound = unexplained.is_none() && against.is_empty() && mended == *robot;
-    let along = record::findings::along_the_rows(&along);
-    for finding in against.into_iter().chain(findings).chain(unexplained).chain(along) {
+    let of_rows = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along));
+    for finding in against.into_iter().chain(findings).chain(unexplained).chain(of_rows) {
         progress::warn(finding.sentence());
     }
     let of_rows = on_rows::mended(&set, robot, &mended);

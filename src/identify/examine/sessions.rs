@@ -6,9 +6,12 @@
 //! segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the cut's unknowns.
 //! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points, touches and distances to
 //! a centre, whose model errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be
-//! cut as well.
+//! cut as well. What moves evenly may be the zero of a joint as well as the sensor: of both, and of steps of both, the likeliest is named, and with
+//! it what explains the rows alike.
 //! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket four touches, are not seen.
+
+mod drift;
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -16,9 +19,12 @@ use std::rc::Rc;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
+use self::drift::{Creeps, Drift};
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
 use crate::identify::finding::Finding;
+use crate::identify::judge::recheck::zero;
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::settings::Settings;
 use crate::identify::solve::linearised::{Fresh, Placement};
@@ -64,7 +70,7 @@ pub struct Along {
     pub drifting: Vec<String>,
     /// Rows that are not of one robot; whatever else a fit to all of them finds follows from that.
     pub robots: Option<Finding>,
-    /// Said instead of a sensor that moved between the sessions where a tool or a joint that did is as likely.
+    /// Said instead of a sensor that moved between the sessions, or drifts, where a tool or a joint that did is as likely.
     pub instead: Option<Finding>,
 }
 
@@ -76,13 +82,18 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     // A zero that is off is no step, and what the calibration leaves open no drift.
     let extras = shared::unknowns(set, settings);
     let (mut look, mut gross) = (Look::Uncapped, Vec::new());
+    let mut drifts: Vec<Drift> = Vec::new();
     for _ in 0..MOST_CUTS {
         let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task, look) else { break };
         let found = search.best_cut(&along.drifting);
-        let drifting = search.drifting(found);
-        along.drifting.extend(drifting.into_iter().filter(|name| !along.drifting.contains(name)).collect::<Vec<_>>());
+        for drift in search.drifts(found) {
+            if !along.drifting.contains(&drift.group) {
+                along.drifting.push(drift.group.clone());
+                drifts.push(drift);
+            }
+        }
         look = match (found, look) {
             (Some(row), _) => {
                 split(&mut cut, row);
@@ -102,6 +113,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     if cut.groups.len() > set.groups.len() {
         along.sessions = list(&cut);
     }
+    along.instead = drift::of_joints(&drifts, robot);
     (cut, along)
 }
 
@@ -129,6 +141,8 @@ struct Placed {
     rows: Vec<(usize, Range<usize>)>,
     /// A column an unknown of a new placement, where only some rows belong to it.
     fresh: Fresh,
+    /// The same of the zero of each joint: one column.
+    zeros: Vec<Fresh>,
     /// Row of the centre that was measured, from which on things move.
     center: Option<usize>,
     /// Fewest rows of a session.
@@ -169,17 +183,23 @@ impl<'a> Search<'a> {
         let freedom = numbers.saturating_sub(unknowns).max(numbers.div_ceil(LEAST_FREEDOM));
         let squares: f64 = parts.iter().map(|(_, p, _)| p.linear.residuals.norm_squared()).sum();
         let mut placed = Vec::new();
+        let at = |joint: usize| task.parameters.iter().position(|p| *p == zero(task.robot)(joint));
+        let zeros: Vec<usize> = (0..task.robot.joints.len()).map_while(at).collect();
         for (block, placement, own) in parts {
             let of_rows: Vec<_> = placement.by_pose().map(|(pose, at)| (rows.rows[pose], at)).collect();
             let (linear, inverse) =
                 (&placement.linear, Rc::new(pseudo_inverse(placement.with_others(&(&normal - own)))));
+            let fresh = |columns| Fresh { linear: linear.clone(), columns, inverse: inverse.clone() };
             let place = |rows, columns, center, rivalled| {
-                let fresh = Fresh { linear: linear.clone(), columns, inverse: inverse.clone() };
-                Placed { rows, fresh, center, shortest: SHORTEST, rivalled, squares }
+                let (fresh, zeros) = (fresh(columns), Vec::new());
+                Placed { rows, fresh, zeros, center, shortest: SHORTEST, rivalled, squares }
             };
+            let zeros = || zeros.iter().map(|&k| fresh(linear.jacobian.columns(k, 1).into_owned())).collect();
             match block {
                 Block::Wire(_) => placed.push(place(of_rows, linear.design.clone(), None, false)),
-                Block::Points(_) => placed.push(place(of_rows, linear.design.clone(), None, true)),
+                Block::Points(_) => {
+                    placed.push(Placed { zeros: zeros(), ..place(of_rows, linear.design.clone(), None, true) });
+                }
                 Block::Center(c) => {
                     let center = Some(rows.rows[c.center]);
                     placed.push(place(of_rows, c.of_center(&problem.places, &rows.scatter), center, true));
@@ -203,8 +223,13 @@ impl<'a> Search<'a> {
     }
 
     fn pays(&self, gain: f64, unknowns: usize) -> bool {
+        self.likelihood(gain, unknowns + 1) > 0.0
+    }
+
+    /// Logarithm of the likelihood that a gain of squares brings, less what so many unknowns cost (Schwarz).
+    fn likelihood(&self, gain: f64, unknowns: usize) -> f64 {
         let left = (self.squares - gain).max(f64::MIN_POSITIVE);
-        self.freedom * (self.squares / left).ln() > (unknowns + 1) as f64 * self.numbers.ln()
+        0.5 * (self.freedom * (self.squares / left).ln() - unknowns as f64 * self.numbers.ln())
     }
 
     /// The row of the set at which a new session pays most, if any does. In groups that are known to drift it need not beat cuts along joints.
@@ -243,21 +268,38 @@ impl<'a> Search<'a> {
         (0..self.set.joint_count()).map(sorted).collect()
     }
 
-    /// Groups whose placement moves evenly along their rows; where one of them is to be cut, only if that explains less.
-    fn drifting(&self, cut: Option<usize>) -> Vec<String> {
-        let drifts = |placed: &&Placed| {
-            let order: Vec<usize> = (0..placed.rows.len()).collect();
-            let gain = placed.ramp(&order);
-            if cut.is_some_and(|cut| placed.rows.iter().any(|(row, _)| *row == cut)) {
-                return placed.best_step(&order).is_some_and(|(step, _)| gain > step);
-            }
-            let rival = self.orders(placed).iter().map(|o| placed.ramp(o)).fold(0.0, f64::max);
-            placed.rows.len() >= 2 * placed.shortest
-                && self.pays(gain, placed.fresh.columns.ncols())
-                && gain > SHARE * placed.squares
-                && gain > BEATS * rival
+    /// What moves evenly along the rows of a group; where one of them is to be cut, only if no step explains more.
+    fn drifts(&self, cut: Option<usize>) -> Vec<Drift> {
+        self.placed.iter().filter_map(|placed| self.drift(placed, cut)).collect()
+    }
+
+    fn drift(&self, placed: &Placed, cut: Option<usize>) -> Option<Drift> {
+        let order: Vec<usize> = (0..placed.rows.len()).collect();
+        let likelihood = |fresh: &Fresh, gain: f64| self.likelihood(gain, fresh.columns.ncols());
+        let is_cut = cut.is_some_and(|cut| placed.rows.iter().any(|(row, _)| *row == cut));
+        let step = |fresh: &Fresh| Some(likelihood(fresh, placed.best_step_of(fresh, &order)?.0));
+        let of_steps = placed.causes().filter(|_| is_cut).filter_map(|(_, fresh)| step(fresh));
+        let best_step = of_steps.fold(f64::NEG_INFINITY, f64::max);
+        let orders = if is_cut { Vec::new() } else { self.orders(placed) };
+        let holds = |fresh: &Fresh, gain: f64| {
+            let rival = || orders.iter().map(|o| placed.ramp(fresh, o).0).fold(0.0, f64::max);
+            is_cut && likelihood(fresh, gain) > best_step
+                || !is_cut
+                    && placed.rows.len() >= 2 * placed.shortest
+                    && self.pays(gain, fresh.columns.ncols())
+                    && gain > SHARE * placed.squares
+                    && gain > BEATS * rival()
         };
-        self.placed.iter().filter(drifts).map(|placed| self.name(placed).clone()).collect()
+        let ramp = |(joint, fresh): (Option<usize>, &Fresh)| {
+            let (gain, amount) = placed.ramp(fresh, &order);
+            (likelihood(fresh, gain), holds(fresh, gain), Creeps { joint, amount })
+        };
+        let ramps: Vec<(f64, bool, Creeps)> = placed.causes().map(ramp).collect();
+        let best = ramps.iter().filter(|(_, holds, _)| *holds).map(|(likely, ..)| *likely).reduce(f64::max)?;
+        let mut alike: Vec<(f64, Creeps)> =
+            ramps.into_iter().filter(|(likely, ..)| best - likely < TOLD_APART).map(|(l, _, c)| (l, c)).collect();
+        alike.sort_by(|a, b| b.0.total_cmp(&a.0));
+        Some(Drift { group: self.name(placed).clone(), causes: alike.into_iter().map(|(_, cause)| cause).collect() })
     }
 
     /// The group of a placement.
@@ -267,15 +309,25 @@ impl<'a> Search<'a> {
 }
 
 impl Placed {
+    /// What may move: the sensor, and the zero of each joint.
+    fn causes(&self) -> impl Iterator<Item = (Option<usize>, &Fresh)> {
+        std::iter::once((None, &self.fresh))
+            .chain(self.zeros.iter().enumerate().map(|(joint, zero)| (Some(joint), zero)))
+    }
+
     /// The place in `order` from which on a new placement gains most, with what it gains.
     fn best_step(&self, order: &[usize]) -> Option<(f64, usize)> {
-        let mut products = self.fresh.nothing();
+        self.best_step_of(&self.fresh, order)
+    }
+
+    fn best_step_of(&self, fresh: &Fresh, order: &[usize]) -> Option<(f64, usize)> {
+        let mut products = fresh.nothing();
         let mut best: Option<(f64, usize)> = None;
         for (late, &k) in order.iter().rev().enumerate() {
-            self.fresh.add(&mut products, &self.rows[k].1, 1.0);
+            fresh.add(&mut products, &self.rows[k].1, 1.0);
             let early = order.len() - late - 1;
             if late + 1 >= self.shortest && early >= self.shortest {
-                let gain = self.fresh.gain(&products);
+                let gain = fresh.gain(&products);
                 if best.is_none_or(|(g, _)| gain > g) {
                     best = Some((gain, k));
                 }
@@ -284,18 +336,18 @@ impl Placed {
         best
     }
 
-    /// What a placement that moves evenly along `order` gains.
-    fn ramp(&self, order: &[usize]) -> f64 {
-        let mut products = self.fresh.nothing();
+    /// What something that moves evenly along `order` gains, and by how much its first unknown then moves in all.
+    fn ramp(&self, fresh: &Fresh, order: &[usize]) -> (f64, f64) {
+        let mut products = fresh.nothing();
         // A placement that is unknown moves from its middle on, one whose centre was measured from there on.
         let start = self.center.map_or(0.5 * order.len() as f64, |center| {
             order.iter().filter(|&&k| self.rows[k].0 < center).count() as f64
         });
         for (i, &k) in order.iter().enumerate() {
             let t = (i as f64 - start) / order.len() as f64;
-            self.fresh.add(&mut products, &self.rows[k].1, t);
+            fresh.add(&mut products, &self.rows[k].1, t);
         }
-        self.fresh.gain(&products)
+        (fresh.gain(&products), fresh.amounts(&products)[0])
     }
 }
 

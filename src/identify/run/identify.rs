@@ -153,6 +153,9 @@ impl Session<'_> {
             // A row that a poorer model could not follow is no gross error, and a richer one follows too much.
             self.rows = self.set.fit_rows();
             gross = self.drop_outliers(by_points, &terms)?;
+        } else if terms.chain > first.chain {
+            // Too few rows to look for them anew: a row that alone tells of a parameter is none where that parameter is fitted.
+            gross = self.take_back(gross, by_points, &terms)?;
         }
         Ok((terms, judged, gross))
     }

@@ -6,7 +6,7 @@ use crate::identify::judge::smooth;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::Extra;
 use crate::identify::settings::{Model, Settings};
-use crate::identify::solve::robust::Loss;
+use crate::identify::solve::robust::{Loss, Robust};
 use crate::identify::solve::task::Task;
 use crate::robot::{Parameter, Robot};
 
@@ -46,11 +46,31 @@ impl Session<'_> {
         if sigmas <= 0.0 {
             return Ok(Gross::default());
         }
+        self.name_outliers(model, terms, &|robust| robust.gross_errors(sigmas))
+    }
+
+    /// Takes back the rows that only a model that is too poor for the robot found far off.
+    pub(super) fn take_back(&mut self, gross: Gross, model: Model, terms: &Terms) -> Result<Gross, Error> {
+        if gross.outliers.is_empty() {
+            return Ok(gross);
+        }
+        let sigmas = self.settings.outlier_sigmas;
+        self.rows = self.set.fit_rows();
+        self.name_outliers(model, terms, &|robust| robust.still_gross(gross.outliers.clone(), sigmas))
+    }
+
+    /// Leaves out the rows that are `gross` errors of a robust fit, and names them; and others that are far off.
+    fn name_outliers(
+        &mut self,
+        model: Model,
+        terms: &Terms,
+        gross: &dyn Fn(&mut Robust) -> Vec<usize>,
+    ) -> Result<Gross, Error> {
         let parameters = terms.parameters(self.robot);
         let mut robust = self.task(&parameters, model).robust(Loss::Biweight)?;
-        let outliers = robust.gross_errors(sigmas);
+        let outliers = gross(&mut robust);
         let doubtful = robust.doubtful(&outliers);
-        let of_verify = robust.far_off(&self.set.verify_rows(), sigmas);
+        let of_verify = robust.far_off(&self.set.verify_rows(), self.settings.outlier_sigmas);
         self.rows.retain(|r| !outliers.contains(r));
         Ok(Gross { outliers, doubtful, of_verify })
     }

@@ -84,6 +84,11 @@ impl Robust<'_> {
         if 2 * out.len() > self.task.rows.len() {
             out.clear();
         }
+        self.still_gross(out, sigmas)
+    }
+
+    /// Which of the rows that were left out stay so: the others go back where the rest predict them. The fit is then one without those that stay.
+    pub fn still_gross(&mut self, mut out: Vec<usize>, sigmas: f64) -> Vec<usize> {
         for _ in 0..ROUNDS {
             for &row in self.task.rows {
                 self.weights[row] = if out.contains(&row) { NEGLIGIBLE } else { 1.0 };

@@ -136,8 +136,13 @@ impl Fresh {
     }
 
     /// By how much the white sum of squares falls with these columns.
-    pub fn gain(&self, Products { pull, own, all }: &Products) -> f64 {
+    pub fn gain(&self, products: &Products) -> f64 {
+        -products.pull.dot(&self.amounts(products))
+    }
+
+    /// The unknowns of these columns where the sum of squares is least.
+    pub fn amounts(&self, Products { pull, own, all }: &Products) -> DVector<f64> {
         let left = own - all * &*self.inverse * all.transpose();
-        pull.dot(&(pseudo_inverse(left) * pull))
+        -(pseudo_inverse(left) * pull)
     }
 }

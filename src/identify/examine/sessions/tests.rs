@@ -84,6 +84,36 @@ fn a_base_that_moved_is_found_in_distances_to_a_centre() {
     assert_eq!(find(&set, &world.nominal, &Settings::default()).1, Along::default());
 }
 
+/// A drift of a joint is none of the sensor, and one of the sensor none of a joint; without either nothing is said.
+#[test]
+fn a_joint_that_creeps_is_told_from_a_sensor_that_drifts() {
+    let creeping = |joint: Option<(usize, f64)>, sensor_mm: f64, seed: u64| {
+        let mut world = synthetic::planned(240, 0, 25.0, 0.02, seed, &|_| {});
+        world.rows.retain(|row| row.at.group == "g1" && row.at.role == Role::Sample);
+        let count = world.rows.len() as f64;
+        for (k, row) in world.rows.iter_mut().enumerate() {
+            *synthetic::point(row) += Vector3::new(0.5, -0.6, 0.6) * sensor_mm * k as f64 / count;
+            if let Some((joint, deg)) = joint {
+                row.at.joints_deg[joint] -= deg * k as f64 / count;
+            }
+        }
+        find(&Dataset::new(&world.rows).unwrap(), &world.nominal, &Settings::default()).1
+    };
+    for seed in [1, 2, 3] {
+        for (joint, deg) in [(1, 0.05), (1, 0.3), (2, 0.05), (4, 0.3), (0, 0.1)] {
+            let said = creeping(Some((joint, deg)), 0.0, seed).instead.map(|finding| finding.finding);
+            let said = said.unwrap_or_else(|| panic!("{seed}: joint {} by {deg} deg", joint + 1));
+            assert!(said.contains(&format!("the zero of joint {} creeps", joint + 1)), "{seed} {deg}: {said}");
+            assert!(joint > 0 || said.contains("or the sensor"), "{seed} {deg}: {said}");
+        }
+        for by_mm in [0.2, 1.0, 5.0] {
+            let along = creeping(None, by_mm, seed);
+            assert!(along.instead.is_none() && !along.drifting.is_empty(), "{seed} {by_mm}: {along:?}");
+        }
+        assert_eq!(creeping(None, 0.0, seed), Along::default());
+    }
+}
+
 #[test]
 fn a_socket_that_moved_is_found_where_it_moved() {
     for moved_mm in [0.3, 1.0, 5.0] {
