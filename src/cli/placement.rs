@@ -17,7 +17,7 @@ pub struct ExportPlacement {
     /// Which group of several [default: each, in a file of its own]
     #[arg(long, value_name = "NAME")]
     pub group: Option<String>,
-    /// Name of the robot's base frame
+    /// Name of the frame that the robot file starts from (a UR's in ROS is `base`, half a turn from `base_link`)
     #[arg(long, value_name = "NAME", default_value = "base_link")]
     pub base_frame: String,
     /// Name of the flange's frame

@@ -166,7 +166,7 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
     let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
     progress::note(format!(
-        "by its measured extent the board has {} of {:.4} x {:.4} mm, not {} mm; by a caliper, to {uncertainty_mm} mm in all",
+        "by its measured extent the board has {} of {:.4} x {:.4} mm, not {} mm; by a caliper, to {uncertainty_mm:.4} mm in all",
         board.unit(),
         board.sides_mm()[0],
         board.sides_mm()[1],

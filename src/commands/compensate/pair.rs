@@ -118,7 +118,7 @@ impl Pair {
             return apart_mm;
         }
         self.of_tools = (apart_mm >= SAME_MM).then(|| {
-            format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too: `--tool X,Y,Z` names the one that works")
+            format!("the tools of the two files are {apart_mm:.3} mm apart, and this is corrected too, which is right for the measured target alone: `--tool X,Y,Z` names the tool that works")
         });
         apart_mm
     }
