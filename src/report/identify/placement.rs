@@ -6,6 +6,7 @@ use crate::diagnostic::two_digits;
 use crate::formats::placements::record::{PlacementFile, TransformRecord};
 use crate::geometry::rotation_vector;
 use crate::report::page;
+use crate::report::table::short;
 
 /// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
 fn cells(record: &TransformRecord) -> Vec<String> {
@@ -14,9 +15,9 @@ fn cells(record: &TransformRecord) -> Vec<String> {
     let [turn_rad, shift_mm] = record.sigmas();
     vec![
         three(record.translation_mm, 3),
-        shift_mm.map_or_else(|| "n/a".to_owned(), two_digits),
+        short(shift_mm),
         turn.unwrap_or_else(|| "not in the readings".to_owned()),
-        turn_rad.map_or_else(|| "n/a".to_owned(), |rad| two_digits(rad.to_degrees())),
+        short(turn_rad.map(f64::to_degrees)),
     ]
 }
 
@@ -31,7 +32,7 @@ pub(super) fn section(placement: &PlacementFile, by_cameras: bool) -> Markup {
         row.extend([
             two_digits(group.error_mm.mean_mm),
             two_digits(group.error_mm.p95_mm),
-            group.held_out.mean_abs_mm.map_or_else(|| "n/a".to_owned(), two_digits),
+            short(group.held_out.mean_abs_mm),
         ]);
         row
     });
