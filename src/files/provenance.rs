@@ -16,8 +16,8 @@ use xxhash_rust::xxh3::xxh3_128;
 /// The key of a JSON file that holds its provenance.
 pub const KEY: &str = "provenance";
 
-/// Extensions of pictures: of a folder that is read, these files count as read.
-const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "jpg", "jpeg", "pgm", "pnm"];
+/// Extensions of pictures, in small letters; those that lose nothing first. Of a folder that is read, these files count as read.
+const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "pgm", "pnm", "jpg", "jpeg"];
 
 /// Digits of a picture's hash that are kept: 64 bits tell any two of a million pictures apart.
 const HASH_KEPT: usize = 16;
@@ -69,9 +69,7 @@ impl Provenance {
         let value: serde_json::Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
         serde_json::from_value(value.get(KEY)?.clone()).ok()
     }
-}
 
-impl Provenance {
     /// The hashes of the pictures that the JSON file there was made of.
     pub fn pictures_of(file: &Utf8Path) -> BTreeSet<String> {
         let inputs = Provenance::of_json(file).map(|made| made.inputs).unwrap_or_default();
@@ -190,14 +188,19 @@ pub fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
     for folder in [folder.to_owned(), folder.join("left"), folder.join("right")] {
         for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
             let path = entry.path();
-            let extension = path.extension().map(str::to_ascii_lowercase);
-            if extension.is_some_and(|e| PICTURES.contains(&e.as_str())) && path.is_file() {
+            if picture_format(path).is_some() && path.is_file() {
                 found.push(path.to_owned());
             }
         }
     }
     found.sort();
     found
+}
+
+/// Which format of picture a file is by its name, those that lose nothing first; `None` where it is none.
+pub fn picture_format(path: &Utf8Path) -> Option<usize> {
+    let extension = path.extension()?.to_ascii_lowercase();
+    PICTURES.iter().position(|known| *known == extension)
 }
 
 /// SHA-256 in hexadecimal digits.
@@ -244,6 +247,7 @@ fn content_sha256(name: &str, bytes: &[u8]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::temporary_folder;
 
     #[test]
     fn content_is_what_is_left_without_provenance() {
@@ -257,8 +261,7 @@ mod tests {
 
     #[test]
     fn what_a_result_was_made_of_is_known_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         let (old, new, result) = (root.join("old.csv"), root.join("new.csv"), root.join("calibration.json"));
         std::fs::write(&old, "1").unwrap();
         std::fs::write(&new, "2").unwrap();
@@ -274,8 +277,7 @@ mod tests {
 
     #[test]
     fn some_of_the_pictures_are_known_again_under_other_names() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         let folder = |name: &str, pictures: &[(&str, &str)]| {
             let folder = root.join(name);
             std::fs::create_dir(&folder).unwrap();
@@ -300,13 +302,12 @@ mod tests {
 
     #[test]
     fn a_folder_is_its_pictures() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         std::fs::create_dir(root.join("left")).unwrap();
         std::fs::write(root.join("left/b.png"), "b").unwrap();
         std::fs::write(root.join("a.JPG"), "a").unwrap();
         std::fs::write(root.join("poses.csv"), "x").unwrap();
-        let read = || Digested::folder(root, &BTreeMap::new()).unwrap();
+        let read = || Digested::folder(&root, &BTreeMap::new()).unwrap();
         let first = read();
         assert_eq!(first.pictures, Some(2));
         assert_eq!(
@@ -320,6 +321,6 @@ mod tests {
         assert!(first.is_other_now() && !read().is_other_now());
         // What counts is what was read, whatever stands there since.
         let known = BTreeMap::from([(root.join("left/b.png"), picture_hash(b"b"))]);
-        assert_eq!(Digested::folder(root, &known).unwrap(), first);
+        assert_eq!(Digested::folder(&root, &known).unwrap(), first);
     }
 }

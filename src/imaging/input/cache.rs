@@ -267,8 +267,8 @@ mod tests {
 
     #[test]
     fn thumbnails_read_back_and_broken_ones_not_at_all() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
+        let (_keep, path) = crate::files::temporary_folder();
+        let out = OutDir::open(&path).unwrap();
         let cache = Cache { out: &out, thumbnails: true };
         let copy = Grey8 { width: 4, height: 3, pixels: b"\n\n12 4\nP5\xff\0\n".to_vec() };
         let small = Small { copy, level: Level::Reduced(15) };

@@ -4,17 +4,14 @@ use maud::{Markup, html};
 
 use crate::diagnostic::two_digits;
 use crate::formats::placements::record::{PlacementFile, TransformRecord};
-use crate::geometry::rotation_vector;
 use crate::report::page;
 use crate::report::table::short;
 
 /// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
 fn cells(record: &TransformRecord) -> Vec<String> {
-    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
-    let turn = record.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
-    let [turn_rad, shift_mm] = record.sigmas();
+    let ((shift, turn), [turn_rad, shift_mm]) = (record.words(), record.sigmas());
     vec![
-        three(record.translation_mm, 3),
+        shift,
         short(shift_mm),
         turn.unwrap_or_else(|| "not in the readings".to_owned()),
         short(turn_rad.map(f64::to_degrees)),
