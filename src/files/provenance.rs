@@ -34,7 +34,7 @@ pub struct Run {
 }
 
 /// The content of `provenance` in a JSON file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Provenance {
     /// "stereocal" and its version.
     pub program: String,
@@ -54,14 +54,7 @@ pub struct Provenance {
 impl Provenance {
     /// That of a run which has read and written nothing yet.
     pub fn new(command: String) -> Provenance {
-        Provenance {
-            program: program(),
-            date: date(),
-            command,
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            measured_by: None,
-        }
+        Provenance { program: program(), date: date(), command, ..Provenance::default() }
     }
 
     /// That which a JSON file holds, if it is one and holds any.
@@ -104,7 +97,7 @@ fn date() -> String {
 }
 
 /// A file or a folder of pictures, with its hash.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Digested {
     /// Its name: as typed if read, below the results folder if written.
     pub file: String,
@@ -124,7 +117,7 @@ pub struct Digested {
 impl Digested {
     pub fn written(name: &str, bytes: &[u8]) -> Digested {
         let (sha256, content_sha256) = rayon::join(|| sha256(bytes), || content_sha256(name, bytes));
-        Digested { file: name.to_owned(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 }
+        Digested { file: name.to_owned(), sha256, content_sha256, ..Digested::default() }
     }
 
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
@@ -159,7 +152,7 @@ impl Digested {
             _ => None,
         };
         let sha256 = sha256_of_file(path)?;
-        Some(Digested { file: path.to_string(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 })
+        Some(Digested { file: path.to_string(), sha256, content_sha256, ..Digested::default() })
     }
 
     /// Whether something else stands where this was read; what is there no more, or lies elsewhere below a folder, says nothing.
