@@ -289,11 +289,19 @@ impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
     }
 }
 
-/// A file of this content for a test, in a folder that goes with the first of what is returned.
+/// A folder for a test, gone with the first of what is returned.
+#[cfg(test)]
+pub fn temporary_folder() -> (tempfile::TempDir, Utf8PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
+    (folder, path)
+}
+
+/// A file of this content in such a folder.
 #[cfg(test)]
 pub fn temporary(name: &str, content: impl AsRef<[u8]>) -> (tempfile::TempDir, Utf8PathBuf) {
-    let folder = tempfile::tempdir().unwrap();
-    let path = Utf8PathBuf::from_path_buf(folder.path().join(name)).unwrap();
+    let (folder, path) = temporary_folder();
+    let path = path.join(name);
     std::fs::write(&path, content).unwrap();
     (folder, path)
 }
@@ -311,9 +319,8 @@ mod tests {
 
     #[test]
     fn a_folder_in_place_of_a_file_is_answered_with_the_files_in_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = Utf8Path::from_path(folder.path()).unwrap();
-        let said = || read_text(path, "robot file", None).unwrap_err();
+        let (_keep, path) = temporary_folder();
+        let said = || read_text(&path, "robot file", None).unwrap_err();
         assert!(said().to_string().contains("this is a folder") && said().hint().unwrap().contains("holds none"));
         std::fs::write(path.join("robot.toml"), "").unwrap();
         assert_eq!(said().hint().unwrap(), format!("name a file in it: `{path}/robot.toml`"));
@@ -324,7 +331,7 @@ mod tests {
         assert!(hint.contains("pose_2.txt` and 3 more; ") && hint.ends_with("one table first, a row a pose"), "{hint}");
         // Of each kind that it may be, that one first.
         std::fs::write(path.join("table.csv"), "").unwrap();
-        let of_table = read_text(path, "measurements file", None).unwrap_err().hint().unwrap();
+        let of_table = read_text(&path, "measurements file", None).unwrap_err().hint().unwrap();
         assert!(of_table.starts_with(&format!("name a file in it: `{path}/table.csv`")), "{of_table}");
         let hint = said().hint().unwrap();
         assert!(hint.starts_with(&format!("name a file in it: `{path}/robot.toml`")), "{hint}");

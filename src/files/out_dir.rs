@@ -315,16 +315,11 @@ fn one_line(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn folder() -> (tempfile::TempDir, Utf8PathBuf) {
-        let folder = tempfile::tempdir().unwrap();
-        let path = Utf8PathBuf::from_path_buf(folder.path().to_owned()).unwrap();
-        (folder, path)
-    }
+    use crate::files::temporary_folder;
 
     #[test]
     fn own_files_are_replaced_and_changed_ones_are_not() {
-        let (_keep, path) = folder();
+        let (_keep, path) = temporary_folder();
         OutDir::open(&path).unwrap().write("a/x.csv", b"1").unwrap();
         let out = OutDir::open(&path).unwrap();
         out.write("a/x.csv", b"2").unwrap();
@@ -344,7 +339,7 @@ mod tests {
 
     #[test]
     fn an_input_is_never_replaced() {
-        let (_keep, path) = folder();
+        let (_keep, path) = temporary_folder();
         OutDir::open(&path).unwrap().write("robot.toml", b"1").unwrap();
         let input = path.join("robot.toml");
         let out = OutDir::open(&path).unwrap().for_run(&Run { force: true, ..Run::default() }, &[&input]);
@@ -353,7 +348,7 @@ mod tests {
 
     #[test]
     fn what_a_killed_run_left_is_swept_away() {
-        let (_keep, path) = folder();
+        let (_keep, path) = temporary_folder();
         std::fs::write(path.join(".stereocal-abcdef"), "half").unwrap();
         OutDir::open(&path).unwrap().write("x", b"1").unwrap();
         assert!(!path.join(".stereocal-abcdef").exists());
@@ -361,7 +356,7 @@ mod tests {
 
     #[test]
     fn json_says_what_it_was_made_of() {
-        let (_keep, path) = folder();
+        let (_keep, path) = temporary_folder();
         std::fs::write(path.join("in.csv"), "a").unwrap();
         let run = Run { command: Some("stereocal x".to_owned()), ..Run::default() };
         let out = OutDir::open(&path).unwrap().for_run(&run, &[&path.join("in.csv"), &path.join("not there")]);

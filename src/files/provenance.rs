@@ -16,8 +16,8 @@ use xxhash_rust::xxh3::xxh3_128;
 /// The key of a JSON file that holds its provenance.
 pub const KEY: &str = "provenance";
 
-/// Extensions of pictures: of a folder that is read, these files count as read.
-const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "jpg", "jpeg", "pgm", "pnm"];
+/// Extensions of pictures, in small letters; those that lose nothing first. Of a folder that is read, these files count as read.
+const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "pgm", "pnm", "jpg", "jpeg"];
 
 /// Digits of a picture's hash that are kept: 64 bits tell any two of a million pictures apart.
 const HASH_KEPT: usize = 16;
@@ -34,7 +34,7 @@ pub struct Run {
 }
 
 /// The content of `provenance` in a JSON file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Provenance {
     /// "stereocal" and its version.
     pub program: String,
@@ -54,14 +54,7 @@ pub struct Provenance {
 impl Provenance {
     /// That of a run which has read and written nothing yet.
     pub fn new(command: String) -> Provenance {
-        Provenance {
-            program: program(),
-            date: date(),
-            command,
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            measured_by: None,
-        }
+        Provenance { program: program(), date: date(), command, ..Provenance::default() }
     }
 
     /// That which a JSON file holds, if it is one and holds any.
@@ -69,9 +62,7 @@ impl Provenance {
         let value: serde_json::Value = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
         serde_json::from_value(value.get(KEY)?.clone()).ok()
     }
-}
 
-impl Provenance {
     /// The hashes of the pictures that the JSON file there was made of.
     pub fn pictures_of(file: &Utf8Path) -> BTreeSet<String> {
         let inputs = Provenance::of_json(file).map(|made| made.inputs).unwrap_or_default();
@@ -106,7 +97,7 @@ fn date() -> String {
 }
 
 /// A file or a folder of pictures, with its hash.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Digested {
     /// Its name: as typed if read, below the results folder if written.
     pub file: String,
@@ -126,7 +117,7 @@ pub struct Digested {
 impl Digested {
     pub fn written(name: &str, bytes: &[u8]) -> Digested {
         let (sha256, content_sha256) = rayon::join(|| sha256(bytes), || content_sha256(name, bytes));
-        Digested { file: name.to_owned(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 }
+        Digested { file: name.to_owned(), sha256, content_sha256, ..Digested::default() }
     }
 
     /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
@@ -161,7 +152,7 @@ impl Digested {
             _ => None,
         };
         let sha256 = sha256_of_file(path)?;
-        Some(Digested { file: path.to_string(), sha256, pictures: None, picture_hashes: Vec::new(), content_sha256 })
+        Some(Digested { file: path.to_string(), sha256, content_sha256, ..Digested::default() })
     }
 
     /// Whether something else stands where this was read; what is there no more, or lies elsewhere below a folder, says nothing.
@@ -190,14 +181,19 @@ pub fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
     for folder in [folder.to_owned(), folder.join("left"), folder.join("right")] {
         for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
             let path = entry.path();
-            let extension = path.extension().map(str::to_ascii_lowercase);
-            if extension.is_some_and(|e| PICTURES.contains(&e.as_str())) && path.is_file() {
+            if picture_format(path).is_some() && path.is_file() {
                 found.push(path.to_owned());
             }
         }
     }
     found.sort();
     found
+}
+
+/// Which format of picture a file is by its name, those that lose nothing first; `None` where it is none.
+pub fn picture_format(path: &Utf8Path) -> Option<usize> {
+    let extension = path.extension()?.to_ascii_lowercase();
+    PICTURES.iter().position(|known| *known == extension)
 }
 
 /// SHA-256 in hexadecimal digits.
@@ -244,6 +240,7 @@ fn content_sha256(name: &str, bytes: &[u8]) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::files::temporary_folder;
 
     #[test]
     fn content_is_what_is_left_without_provenance() {
@@ -257,8 +254,7 @@ mod tests {
 
     #[test]
     fn what_a_result_was_made_of_is_known_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         let (old, new, result) = (root.join("old.csv"), root.join("new.csv"), root.join("calibration.json"));
         std::fs::write(&old, "1").unwrap();
         std::fs::write(&new, "2").unwrap();
@@ -274,8 +270,7 @@ mod tests {
 
     #[test]
     fn some_of_the_pictures_are_known_again_under_other_names() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         let folder = |name: &str, pictures: &[(&str, &str)]| {
             let folder = root.join(name);
             std::fs::create_dir(&folder).unwrap();
@@ -300,13 +295,12 @@ mod tests {
 
     #[test]
     fn a_folder_is_its_pictures() {
-        let folder = tempfile::tempdir().unwrap();
-        let root = Utf8Path::from_path(folder.path()).unwrap();
+        let (_keep, root) = temporary_folder();
         std::fs::create_dir(root.join("left")).unwrap();
         std::fs::write(root.join("left/b.png"), "b").unwrap();
         std::fs::write(root.join("a.JPG"), "a").unwrap();
         std::fs::write(root.join("poses.csv"), "x").unwrap();
-        let read = || Digested::folder(root, &BTreeMap::new()).unwrap();
+        let read = || Digested::folder(&root, &BTreeMap::new()).unwrap();
         let first = read();
         assert_eq!(first.pictures, Some(2));
         assert_eq!(
@@ -320,6 +314,6 @@ mod tests {
         assert!(first.is_other_now() && !read().is_other_now());
         // What counts is what was read, whatever stands there since.
         let known = BTreeMap::from([(root.join("left/b.png"), picture_hash(b"b"))]);
-        assert_eq!(Digested::folder(root, &known).unwrap(), first);
+        assert_eq!(Digested::folder(&root, &known).unwrap(), first);
     }
 }

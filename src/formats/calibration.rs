@@ -28,7 +28,7 @@ const VERSION: u32 = 1;
 const BY_LENGTH: &str = "opencv";
 
 /// A rig in the file's words.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct CalibrationFile {
     version: u32,
     left: CameraRecord,
@@ -136,7 +136,7 @@ struct NoiseRecord {
     pairs: Option<usize>,
 }
 
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct CameraRecord {
     width: u32,
     height: u32,
@@ -148,7 +148,7 @@ struct CameraRecord {
     distortion: Vec<f64>,
 }
 
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 struct RigRecord {
     rotation: Vec<Vec<f64>>,
     translation_mm: Vec<f64>,
@@ -208,14 +208,7 @@ impl From<&Rig> for CalibrationFile {
                 .covariance
                 .as_ref()
                 .map(|c| CovarianceRecord { order: c.order.clone(), matrix: rows(&c.matrix) }),
-            corner_noise: None,
-            boards: None,
-            volume: None,
-            check: None,
-            board: None,
-            unconfirmed: Vec::new(),
-            changes_since: Vec::new(),
-            known_moves: Vec::new(),
+            ..CalibrationFile::default()
         }
     }
 }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::geometry::rotation_matrix;
+use crate::linear_algebra::rows;
 use crate::plan::Plan;
 use crate::plan::predict::Accuracy;
 
@@ -39,7 +40,7 @@ pub struct Group {
 /// A rigid transform.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct CamFromBase {
-    pub rotation: [[f64; 3]; 3],
+    pub rotation: Vec<Vec<f64>>,
     pub translation_mm: [f64; 3],
 }
 
@@ -61,17 +62,14 @@ pub struct PlanFile {
 
 impl PlanFile {
     pub fn new(plan: &Plan) -> PlanFile {
-        let group = |(k, placement): (usize, &crate::plan::scene::Placement)| {
-            let r = rotation_matrix(&placement.left_from_base);
-            Group {
-                group: placement.name.clone(),
-                center_mm: placement.center_mm.into(),
-                cam_from_base: CamFromBase {
-                    rotation: [0, 1, 2].map(|i| [r[(i, 0)], r[(i, 1)], r[(i, 2)]]),
-                    translation_mm: placement.left_from_base.translation.vector.into(),
-                },
-                poses: plan.poses.iter().filter(|p| p.group == k).count(),
-            }
+        let group = |(k, placement): (usize, &crate::plan::scene::Placement)| Group {
+            group: placement.name.clone(),
+            center_mm: placement.center_mm.into(),
+            cam_from_base: CamFromBase {
+                rotation: rows(&rotation_matrix(&placement.left_from_base)),
+                translation_mm: placement.left_from_base.translation.vector.into(),
+            },
+            poses: plan.poses.iter().filter(|p| p.group == k).count(),
         };
         PlanFile {
             plan: determined(&plan.accuracy, &plan.expected),

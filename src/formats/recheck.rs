@@ -183,8 +183,8 @@ mod tests {
 
     #[test]
     fn a_history_survives_the_file() {
-        let folder = tempfile::tempdir().unwrap();
-        let out = OutDir::open(&Utf8Path::from_path(folder.path()).unwrap().join("out")).unwrap();
+        let (_keep, path) = files::temporary_folder();
+        let out = OutDir::open(&path.join("out")).unwrap();
         assert_eq!(history(&out, HISTORY).unwrap(), []);
         let check = |date: &str, standing| Check {
             date: date.to_owned(),

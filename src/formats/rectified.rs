@@ -9,7 +9,7 @@ use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling};
 use crate::stereo::{Rig, Side};
 
 /// The content of `rectified.json`. Matrices row by row, px and mm.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RectifiedFile {
     /// "rectify", or "undistort" where each picture was straightened by itself.
     pub mode: &'static str,
@@ -43,7 +43,7 @@ pub struct RectifiedFile {
 }
 
 /// Share of each picture that shows something.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Coverage {
     pub left: f64,
     pub right: f64,
@@ -85,19 +85,12 @@ impl RectifiedFile {
             mode: "undistort",
             width: rig.left.width,
             height: rig.left.height,
-            alpha: None,
-            zero_disparity: None,
             r1: rows(r1),
             r2: rows(r2),
             p1: rows(p1),
             p2: rows(p2),
-            q: None,
             coverage,
-            common: None,
-            residual: None,
-            board: None,
-            pairs: Vec::new(),
-            pairs_skipped: Vec::new(),
+            ..RectifiedFile::default()
         }
     }
 

@@ -54,6 +54,13 @@ pub struct Corner {
     pub used: bool,
 }
 
+impl Corner {
+    /// A corner of which no more is known than its place.
+    pub fn at(col: usize, row: usize, px: Point2<f64>) -> Corner {
+        Corner { col, row, px, covariance_px2: None, blur_px: None, reach: None, used: true }
+    }
+}
+
 /// The corners of one board in one pair of pictures. Each list is sorted by row, then column; a corner may be missing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PairCorners {

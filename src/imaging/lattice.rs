@@ -143,7 +143,7 @@ impl<T: Clone> Lattice<T> {
 }
 
 /// Another numbering of the same corners: turned about corner (0, 0) by so many quarter turns, then moved by columns and rows.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Renumbering {
     /// Quarter turns, from the columns' direction to the rows'.
     pub quarters: usize,

@@ -68,15 +68,7 @@ mod tests {
 
     /// A pair whose left picture shows these columns and rows of corners.
     fn pair(cols: std::ops::Range<usize>, rows: std::ops::Range<usize>) -> PairCorners {
-        let corner = |col, row| Corner {
-            col,
-            row,
-            px: Point2::origin(),
-            covariance_px2: None,
-            blur_px: None,
-            reach: None,
-            used: true,
-        };
+        let corner = |col, row| Corner::at(col, row, Point2::origin());
         let left = rows.flat_map(|row| cols.clone().map(move |col| corner(col, row))).collect();
         PairCorners { left, ..PairCorners::default() }
     }

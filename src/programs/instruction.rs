@@ -6,45 +6,38 @@ use super::scan;
 const QUOTED: usize = 60;
 
 /// Why a motion is not corrected.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Cause {
     /// Its target is a pose of the tool.
+    #[error("is Cartesian")]
     Cartesian,
     /// Its joint values are computed or written at run time, or stand in another file, a register or a parameter.
+    #[error("moves by values that are not numbers in this file")]
     Elsewhere,
     /// It adds something to its target.
+    #[error("adds an offset to its target")]
     Offset,
     /// Its target has other axes than the robot.
+    #[error("does not give the robot's joints, all of them and no others")]
     Incomplete,
     /// A speed, a force or a sensor leads it.
+    #[error("follows a speed, a force or a sensor")]
     Led,
     /// It moves other axes than the robot's.
+    #[error("moves external axes")]
     External,
     /// It moves another group of axes, as of a second robot.
+    #[error("moves another group of axes than the robot's")]
     Group,
     /// Its word says that it moves, and no more is known of it.
+    #[error("is an instruction that is not known here")]
     Unknown,
     /// Two groups of the program have as many joints.
+    #[error("moves two groups with as many joints")]
     Groups,
     /// The correction of its target was refused, for this reason.
+    #[error("is not corrected: {0}")]
     Refused(String),
-}
-
-impl std::fmt::Display for Cause {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Cause::Cartesian => write!(f, "is Cartesian"),
-            Cause::Elsewhere => write!(f, "moves by values that are not numbers in this file"),
-            Cause::Offset => write!(f, "adds an offset to its target"),
-            Cause::Incomplete => write!(f, "does not give the robot's joints, all of them and no others"),
-            Cause::Led => write!(f, "follows a speed, a force or a sensor"),
-            Cause::External => write!(f, "moves external axes"),
-            Cause::Group => write!(f, "moves another group of axes than the robot's"),
-            Cause::Unknown => write!(f, "is an instruction that is not known here"),
-            Cause::Groups => write!(f, "moves two groups with as many joints"),
-            Cause::Refused(reason) => write!(f, "is not corrected: {reason}"),
-        }
-    }
 }
 
 /// An instruction that moves the robot.

@@ -23,4 +23,4 @@ pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};
 pub use joint_order::JointOrder;
 pub use language::{Joints, Language, Motion, Stop, Target};
-pub use read::{Program, targets, with_readings};
+pub use read::{Program, edited, targets, with_readings};

@@ -76,6 +76,11 @@ pub fn with_readings(language: Language, text: &str, joints: Joints, changed: &[
             edits.push((place.clone(), dialect::written(language, &text[place.clone()], written, value)));
         }
     }
+    edited(text, edits)
+}
+
+/// A text with other words in some places.
+pub fn edited(text: &str, mut edits: Vec<(Range<usize>, String)>) -> String {
     edits.sort_by_key(|(place, _)| place.start);
     let mut out = String::with_capacity(text.len() + 8 * edits.len());
     let mut done = 0;

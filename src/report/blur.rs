@@ -110,7 +110,7 @@ mod tests {
     use nalgebra::Point2;
 
     fn corner(x: f64, y: f64, blur_px: Option<f64>) -> Corner {
-        Corner { col: 0, row: 0, px: Point2::new(x, y), covariance_px2: None, blur_px, reach: None, used: true }
+        Corner { blur_px, ..Corner::at(0, 0, Point2::new(x, y)) }
     }
 
     #[test]

@@ -7,8 +7,8 @@ use maud::{Markup, html};
 use serde_json::Value;
 
 use super::page::{self, Tone};
-use super::table::number;
-use crate::diagnostic::{at_most, summed, two_digits};
+use super::table::{number, short};
+use crate::diagnostic::{at_most, summed};
 use crate::files::OutDir;
 
 /// What the commands wrote, as far as it is there.
@@ -61,7 +61,7 @@ fn figure<'a>(value: &'a Value, pointer: &str) -> Option<&'a Value> {
 }
 
 fn mm(value: &Value, pointer: &str) -> String {
-    figure(value, pointer).and_then(Value::as_f64).map_or_else(|| "n/a".to_owned(), two_digits)
+    short(figure(value, pointer).and_then(Value::as_f64))
 }
 
 /// A length that is no error, mm.
@@ -87,6 +87,11 @@ fn chosen(robot: &Value) -> Option<&Value> {
     let wanted = text(robot, "/chosen");
     let methods = robot.get("methods")?.as_array()?;
     methods.iter().find(|m| format!("{}/{}", text(m, "/name"), text(m, "/model")) == wanted)
+}
+
+/// Its mean distance error on verify rows, mm.
+fn after(robot: &Value) -> String {
+    chosen(robot).map_or_else(|| "n/a".to_owned(), |method| mm(method, "/verify/mean_abs_mm"))
 }
 
 /// The lines on stdout.
@@ -147,35 +152,27 @@ fn robot_words(robot: &Value) -> String {
     if text(robot, "/advice") == "do-not-use" {
         return format!("do not use the identified robot: {}", text(robot, "/reason"));
     }
-    let after = chosen(robot).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
     let doubt = match text(robot, "/advice") {
         "check" => format!("; check before you use the identified robot: {}", text(robot, "/reason")),
         _ => String::new(),
     };
-    format!("mean distance error {} mm before, {after} mm after{doubt}", mm(robot, "/before/verify/mean_abs_mm"))
+    let before = mm(robot, "/before/verify/mean_abs_mm");
+    format!("mean distance error {before} mm before, {} mm after{doubt}", after(robot))
 }
 
 /// The number that matters most of each part that is there.
-fn numbers(day: &Day) -> Vec<(String, String)> {
-    let of = |part: &Option<Value>, say: &dyn Fn(&Value) -> (String, &str)| {
-        part.as_ref().map(say).map(|(value, what)| (value, what.to_owned()))
-    };
-    [
-        of(&day.check, &|c| {
-            (
-                format!("{} mm", bound(c, "/judged_length/at_most_mm")),
-                "largest length error of the rig with its uncertainty",
-            )
-        }),
-        of(&day.measured, &|m| (format!("{} of {}", count(m, "/measured"), count(m, "/poses")), "poses measured")),
-        of(&day.robot, &|r| {
-            let after = chosen(r).map_or_else(|| "n/a".to_owned(), |m| mm(m, "/verify/mean_abs_mm"));
-            (format!("{after} mm"), "mean distance error of the robot after identification")
-        }),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+fn numbers(day: &Day) -> Vec<(String, &'static str)> {
+    let length = |check: &Value| format!("{} mm", bound(check, "/judged_length/at_most_mm"));
+    let poses = |measured: &Value| format!("{} of {}", count(measured, "/measured"), count(measured, "/poses"));
+    let parts = [
+        (day.check.as_ref().map(length), "largest length error of the rig with its uncertainty"),
+        (day.measured.as_ref().map(poses), "poses measured"),
+        (
+            day.robot.as_ref().map(|robot| format!("{} mm", after(robot))),
+            "mean distance error of the robot after identification",
+        ),
+    ];
+    parts.into_iter().filter_map(|(value, what)| Some((value?, what))).collect()
 }
 
 pub fn page(day: &Day) -> String {

@@ -2,18 +2,15 @@
 
 use crate::files::OutDir;
 use crate::formats::placements::record::{PLACEMENT, PlacementFile, TransformRecord};
-use crate::geometry::rotation_vector;
 use crate::identify::judge::locate::Fit;
 use crate::report::table::number;
 
 fn line(what: &str, record: &TransformRecord) -> String {
-    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
-    let [turn_rad, shift_mm] = record.sigmas();
+    let ((shift, turn), [turn_rad, shift_mm]) = (record.words(), record.sigmas());
     let shift = match shift_mm {
-        Some(sigma) => format!("{} mm +- {:.4}", three(record.translation_mm, 3), 2.0 * sigma),
-        None => format!("{} mm (as in the robot's file)", three(record.translation_mm, 3)),
+        Some(sigma) => format!("{shift} mm +- {:.4}", 2.0 * sigma),
+        None => format!("{shift} mm (as in the robot's file)"),
     };
-    let turn = record.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
     let turn = match (turn, turn_rad) {
         (Some(turn), Some(sigma)) => format!("; turned by {turn} deg +- {:.5}", 2.0 * sigma.to_degrees()),
         _ => "; its turn is not in the readings".to_owned(),

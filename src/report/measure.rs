@@ -9,8 +9,8 @@ use super::drawing::figure::Plot;
 use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
 use super::rig;
-use super::table::number;
-use crate::diagnostic::{aligned, two_digits};
+use super::table::{number, short};
+use crate::diagnostic::aligned;
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
 use crate::measurements::Role;
@@ -83,24 +83,13 @@ fn quality(file: &MeasureFile, mm: fn(Option<f64>) -> String) -> String {
     )
 }
 
-/// A length on the page.
-fn short(mm: Option<f64>) -> String {
-    mm.map_or_else(|| "n/a".to_owned(), two_digits)
-}
-
 /// The three numbers of the page: how well the point is known, and how well boards fit.
-fn numbers(file: &MeasureFile) -> [(String, String); 3] {
+fn numbers(file: &MeasureFile) -> [(String, &'static str); 3] {
     let worst = file.sigma_mm.map(|sigma| sigma.into_iter().fold(0.0, f64::max));
     [
-        (
-            format!("{} mm", short(worst)),
-            "median standard deviation of the mark point, along its least certain axis".to_owned(),
-        ),
-        (
-            format!("{} mm", short(file.fit_rms_mm)),
-            "what is left of the corners after fitting the target (RMS)".to_owned(),
-        ),
-        (format!("{} px", number(file.reprojection_rms_px, 3)), "reprojection residual (RMS)".to_owned()),
+        (format!("{} mm", short(worst)), "median standard deviation of the mark point, along its least certain axis"),
+        (format!("{} mm", short(file.fit_rms_mm)), "what is left of the corners after fitting the target (RMS)"),
+        (format!("{} px", number(file.reprojection_rms_px, 3)), "reprojection residual (RMS)"),
     ]
 }
 

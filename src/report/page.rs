@@ -3,7 +3,7 @@
 use super::drawing::script::SCRIPT;
 use crate::files::provenance::{Digested, Provenance};
 use crate::files::{self, OutDir};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
 /// How the verdict at the top of a page is coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -152,7 +152,7 @@ fn before_the_end(page: String, more: &Markup) -> String {
 }
 
 /// The box that says first what the reader came for: a word or two, the numbers that matter most with what they are, and a sentence.
-pub fn verdict(tone: Tone, headline: &str, numbers: &[(String, String)], explanation: &str) -> Markup {
+pub fn verdict(tone: Tone, headline: &str, numbers: &[(String, impl Render)], explanation: &str) -> Markup {
     html! {
         div class={ "verdict " (tone.class()) } {
             strong { (headline) }

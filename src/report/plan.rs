@@ -6,7 +6,7 @@ use nalgebra::{Point3, Vector3};
 use super::Result;
 use super::drawing::figure::Plot;
 use super::page;
-use super::table::{Table, number};
+use super::table::{Table, number, short};
 use crate::diagnostic::{count, two_digits};
 use crate::formats::plan::{Determined, Expected, PlanFile};
 use crate::measurements::Role;
@@ -95,7 +95,7 @@ fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
     let best = record.plan.expected.iter().filter(|e| e.poses <= samples).max_by_key(|e| e.poses);
     [
         (
-            format!("{} mm", best.map_or_else(|| "n/a".to_owned(), |e| two_digits(e.rms_mm))),
+            format!("{} mm", short(best.map(|e| e.rms_mm))),
             format!("position error that the parameters leave after {} samples", best.map_or(samples, |e| e.poses)),
         ),
         (plan.poses.len().to_string(), format!("poses, {samples} of them samples")),

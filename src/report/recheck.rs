@@ -88,13 +88,9 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     lines.push(format!("next: {}", next(standing)));
     let mut table = Table::new(["cause", "changed by", "+- (95 %)", "would be seen", "mm of a length"]);
     for cause in &recheck.causes {
-        table.row([
-            cause.words.clone(),
-            changed(cause)[0].clone(),
-            changed(cause)[1].clone(),
-            format!("{} {}", two_digits(cause.seen), cause.unit),
-            two_digits(cause.seen_mm),
-        ]);
+        let [amount, within] = changed(cause);
+        let seen = format!("{} {}", two_digits(cause.seen), cause.unit);
+        table.row([cause.words.clone(), amount, within, seen, two_digits(cause.seen_mm)]);
     }
     format!(
         "{}\n\n{table}\n{} in {}\nreport: {}\n",
@@ -113,46 +109,44 @@ pub fn page(
     checks: &[Check],
     warnings: &[String],
 ) -> Result<String> {
-    let numbers = vec![
-        (format!("{} mm", two_digits(recheck.effect_mm)), "change of a length beyond chance".to_owned()),
-        (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
-        (format!("{tolerance_mm} mm"), "tolerance".to_owned()),
+    let numbers = [
+        (format!("{} mm", two_digits(recheck.effect_mm)), "change of a length beyond chance"),
+        (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen"),
+        (format!("{tolerance_mm} mm"), "tolerance"),
     ];
     let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm, two_digits), next(standing));
     let rows: Vec<Vec<String>> = recheck
         .causes
         .iter()
         .map(|cause| {
+            let [amount, within] = changed(cause);
             vec![
                 cause.words.clone(),
-                changed(cause)[0].clone(),
-                changed(cause)[1].clone(),
+                amount,
+                within,
                 two_digits(cause.effect_mm),
                 format!("{} {}", two_digits(cause.seen), cause.unit),
                 two_digits(cause.seen_mm),
             ]
         })
         .collect();
-    let header = [
-        "cause",
-        "changed by, if it alone did",
-        "+- (95 %)",
-        "moves a length by, mm",
-        "would be seen",
-        "would move it by, mm",
-    ];
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
         (page::warnings(warnings))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
-        (page::table(&header, &rows))
+        (page::table(&header("moves a length by, mm"), &rows))
         (history(checks, tolerance_mm, "Change of a length", "the calibration no longer holds")?)
     };
     let lead =
         compared(recheck.pairs.len(), "pair", standing, ["the calibration", "the calibration that was made of them"]);
     Ok(page::page("Is the rig still the calibrated one?", &lead, &content))
+}
+
+/// Of the table of causes.
+pub(super) fn header(moves: &str) -> [&str; 6] {
+    ["cause", "changed by, if it alone did", "+- (95 %)", moves, "would be seen", "would move it by, mm"]
 }
 
 /// What was compared with what: of `names` the second is for data that it was made of.

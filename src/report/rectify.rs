@@ -140,10 +140,9 @@ fn caption(name: &str, file: &RectifiedFile) -> String {
 
 /// The picture with epipolar lines over it, as SVG.
 fn lined(jpeg: &PairJpeg, common: Option<&str>) -> String {
-    let (w, h) = (jpeg.width, jpeg.height);
     let line =
         |[x1, y1, x2, y2]: [f64; 4]| format!("<line x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" y2=\"{y2:.1}\"/>");
-    let (full_w, full_h) = (f64::from(w), f64::from(h));
+    let (full_w, full_h) = (f64::from(jpeg.width), f64::from(jpeg.height));
     let places = (1..LINES).map(|k| f64::from(k) / f64::from(LINES));
     let lines: String = match common {
         Some("rows") => places.map(|s| line([0.0, s * full_h, full_w, s * full_h])).collect(),
@@ -152,12 +151,8 @@ fn lined(jpeg: &PairJpeg, common: Option<&str>) -> String {
         }
         None => String::new(),
     };
-    format!(
-        "<svg class=\"photo\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"the pair side by side\">\
-         <image width=\"{w}\" height=\"{h}\" href=\"data:image/jpeg;base64,{}\"/>\
-         <g stroke=\"#ff3b30\" stroke-width=\"0.8\" stroke-opacity=\"0.75\">{lines}</g></svg>",
-        jpeg.base64
-    )
+    let drawn = format!("<g stroke=\"#ff3b30\" stroke-width=\"0.8\" stroke-opacity=\"0.75\">{lines}</g>");
+    jpeg.svg("the pair side by side", &drawn)
 }
 
 /// The differences of a pair's corners as arrows over the left picture.

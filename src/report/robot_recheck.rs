@@ -4,7 +4,7 @@ use maud::html;
 
 use super::Result;
 use super::page;
-use super::recheck::{compared, history, tone, word};
+use super::recheck::{compared, header, history, tone, word};
 use super::table::{Table, number, with_sigma};
 use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
@@ -115,15 +115,6 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     recheck.causes.iter().map(of).chain(placements).collect()
 }
 
-const HEADER: [&str; 6] = [
-    "cause",
-    "changed by, if it alone did",
-    "+- (95 %)",
-    "moves the target by, mm",
-    "would be seen",
-    "would move it by, mm",
-];
-
 /// The same for a terminal of 80 columns: change with its interval, unit, its effect, what would be seen and its effect.
 fn lines(recheck: &Recheck) -> Table {
     let four = |value: f64| number(Some(value), 4);
@@ -164,12 +155,13 @@ pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -
 /// The report. Also shows the run's `warnings`.
 pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[String]) -> Result<String> {
     let Judged { standing, tolerance_mm, .. } = judged;
-    let numbers = vec![
-        (format!("{} mm", two_digits(recheck.effect_mm)), "movement of the target beyond chance".to_owned()),
-        (format!("{} mm", two_digits(recheck.at_most_mm)), "not ruled out".to_owned()),
-        (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen".to_owned()),
-        (format!("{} mm", two_digits(tolerance_mm)), "tolerance".to_owned()),
-    ];
+    let numbers = [
+        (recheck.effect_mm, "movement of the target beyond chance"),
+        (recheck.at_most_mm, "not ruled out"),
+        (recheck.seen_mm, "would have been seen"),
+        (tolerance_mm, "tolerance"),
+    ]
+    .map(|(mm, what)| (format!("{} mm", two_digits(mm)), what));
     let text = format!("{}. Next: {}.", sentence(recheck, judged, two_digits), next(judged, recheck));
     let (sensor, moved) = match recheck.by_cameras {
         true => ("once the cameras' place was found anew", "cameras that moved"),
@@ -182,7 +174,7 @@ pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[Str
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see; mm at the pose where it moves the target most, \
              " (sensor) ". The zero of joint 1 is seen as " (moved) "." }
-        (page::table(&HEADER, &rows))
+        (page::table(&header("moves the target by, mm"), &rows))
         (history(checks, tolerance_mm, "Movement of the target", "the robot is no longer the identified one")?)
     };
     let names = ["the identified robot", "the robot that was identified from them"];

@@ -1,4 +1,6 @@
-//! Plain tables for the terminal.
+//! Plain tables for the terminal, and numbers as text.
+
+use crate::diagnostic::two_digits;
 
 /// A table with a header; the first column is aligned left, the others right.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -51,6 +53,11 @@ pub fn number(value: Option<f64>, decimals: usize) -> String {
         }
         _ => "n/a".to_owned(),
     }
+}
+
+/// An error or an uncertainty on a page, as [`two_digits`] writes it; "n/a" where there is none.
+pub fn short(value: Option<f64>) -> String {
+    two_digits(value.unwrap_or(f64::NAN))
 }
 
 /// A value and its standard deviation with two digits of the latter, and the same decimals of the former.

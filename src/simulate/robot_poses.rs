@@ -265,15 +265,8 @@ mod tests {
 
     #[test]
     fn a_robot_without_deviations_is_where_it_should_be() {
-        let none = super::super::settings::RobotDeviations {
-            angle_deg: 0.0,
-            length_mm: 0.0,
-            beta_deg: 0.0,
-            gravity_mrad_per_m: 0.0,
-            harmonics_mrad: 0.0,
-            repeatability_mm: 0.0,
-        };
-        let world = World::new(Settings { robot: none, ..Settings::small() }, None).unwrap();
+        let robot = super::super::settings::RobotDeviations::default();
+        let world = World::new(Settings { robot, ..Settings::small() }, None).unwrap();
         assert!(before(&world).iter().all(|d| *d < 1e-9));
     }
 }

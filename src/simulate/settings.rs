@@ -28,7 +28,7 @@ pub struct Sphere {
 }
 
 /// How the true robot differs from the nominal one.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RobotDeviations {
     /// Largest deviation of alpha and theta, deg (uniform).
     pub angle_deg: f64,
@@ -104,10 +104,8 @@ impl Settings {
                 // seeds; the paper measured 1.16 mm.
                 angle_deg: 1.0,
                 length_mm: 1.0,
-                beta_deg: 0.0,
-                gravity_mrad_per_m: 0.0,
-                harmonics_mrad: 0.0,
                 repeatability_mm: 0.02,
+                ..RobotDeviations::default()
             },
             point_noise_mm: 0.01,
         }

@@ -154,15 +154,7 @@ impl World {
         let list = |shot: &Shot, side: Side| -> Vec<Corner> {
             let at = self.scene(shot, side, &plain, &[]).corners_px();
             let columns = board.columns();
-            let corner = |(k, px): (usize, Point2<f64>)| Corner {
-                col: k % columns,
-                row: k / columns,
-                px,
-                covariance_px2: None,
-                blur_px: None,
-                reach: None,
-                used: true,
-            };
+            let corner = |(k, px): (usize, Point2<f64>)| Corner::at(k % columns, k / columns, px);
             at.into_iter().enumerate().map(corner).collect()
         };
         let shots = self.shots();

@@ -28,12 +28,11 @@ fn a_rig_survives_the_file() {
 
 #[test]
 fn a_folder_stands_for_the_one_calibration_in_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = Utf8Path::from_path(folder.path()).unwrap();
+    let (_keep, path) = files::temporary_folder();
     let (out, usual) = (path.join("new"), path.join("out"));
     std::fs::create_dir(&usual).unwrap();
     let put = |name: &str| std::fs::write(path.join(name), "").unwrap();
-    let found = || file(Some(path), &out, &usual).map_err(|e| e.to_string());
+    let found = || file(Some(&path), &out, &usual).map_err(|e| e.to_string());
     assert_eq!(file(None, &out, &usual).unwrap(), path.join("new/calibration.json"));
     put("out/calibration.json");
     assert_eq!(file(None, &out, &usual).unwrap(), path.join("out/calibration.json"));
@@ -77,8 +76,7 @@ fn what_is_no_rig_is_refused_by_name() {
 
 #[test]
 fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = Utf8Path::from_path(folder.path()).unwrap().join("calibration.json");
+    let (_keep, path) = files::temporary("calibration.json", "");
     let doubts = |check: Option<(Verdict, Option<f64>)>, unconfirmed: &[&str]| {
         let mut file = CalibrationFile::from(&plain());
         file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });

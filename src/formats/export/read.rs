@@ -88,8 +88,7 @@ mod tests {
 
     /// What is read of files whose text is changed so.
     fn read_changed(files: &[ExportedFile], change: impl Fn(&str) -> String) -> Result<Rig, String> {
-        let dir = tempfile::tempdir().unwrap();
-        let dir = Utf8Path::from_path(dir.path()).unwrap();
+        let (_keep, dir) = crate::files::temporary_folder();
         files.iter().for_each(|file| std::fs::write(dir.join(file.name), change(&file.text)).unwrap());
         super::read(&dir.join(files[0].name), &change(&files[0].text)).unwrap()
     }

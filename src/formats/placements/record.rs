@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::files::{self, Result};
 use crate::formats::checked;
-use crate::geometry::{Transform, rotation_matrix};
+use crate::geometry::{Transform, rotation_matrix, rotation_vector};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::{RowError, Spread};
 use crate::identify::judge::lengths::Lengths;
@@ -83,6 +83,13 @@ impl TransformRecord {
         let rotation = self.rotation?;
         let rotation = Matrix3::from_fn(|r, c| rotation[r][c]);
         Some(crate::geometry::transform_from_matrix(rotation, Vector3::from(self.translation_mm)))
+    }
+
+    /// The shift, mm, and the turn, deg, three numbers each; `None` without a rotation.
+    pub fn words(&self) -> (String, Option<String>) {
+        let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
+        let turn = self.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
+        (three(self.translation_mm, 3), turn)
     }
 
     /// Standard deviations of the turn, rad, and of the shift, mm, each as the root of the mean square of its three; `None` for what was not found.

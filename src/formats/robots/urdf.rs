@@ -11,6 +11,7 @@ use roxmltree::{Document, Node};
 
 use crate::files::{self, Result};
 use crate::geometry::{Transform, transform};
+use crate::programs::edited;
 use crate::progress;
 use crate::robot::Robot;
 use crate::robot::axes::{self, Axis};
@@ -194,13 +195,7 @@ impl Urdf {
             Ok(range) => (range.clone(), origin_element(origin)),
             Err(at) => (*at..*at, format!("\n    {}", origin_element(origin))),
         };
-        let mut edits: Vec<(std::ops::Range<usize>, String)> = origins.iter().map(edit).collect();
-        edits.sort_by_key(|(range, _)| std::cmp::Reverse(range.start));
-        let mut text = self.text.clone();
-        for (range, element) in edits {
-            text.replace_range(range, &element);
-        }
-        text
+        edited(&self.text, origins.iter().map(edit).collect())
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Refusal {
 
 impl From<String> for Refusal {
     fn from(reason: String) -> Refusal {
-        // One line: a reason is kept as a line of the cache.
+        // One line: reasons are listed, one a line.
         Refusal { reason: reason.replace('\n', " "), seen: None }
     }
 }

@@ -61,13 +61,13 @@ pub struct Picture {
 
 impl From<Image<u8>> for Picture {
     fn from(image: Image<u8>) -> Picture {
-        Picture { clip_level: level(&image), grey: Grey::Eight(image) }
+        Picture { clip_level: channel_level(&image.pixels, 1, 0), grey: Grey::Eight(image) }
     }
 }
 
 impl From<Image<u16>> for Picture {
     fn from(image: Image<u16>) -> Picture {
-        Picture { clip_level: level(&image), grey: Grey::Sixteen(image) }
+        Picture { clip_level: channel_level(&image.pixels, 1, 0), grey: Grey::Sixteen(image) }
     }
 }
 
@@ -93,11 +93,6 @@ impl Picture {
             Grey::Sixteen(image) => (image.width, image.height),
         }
     }
-}
-
-/// The clip level of a grey picture.
-fn level<T: Value>(image: &Image<T>) -> f64 {
-    channel_level(&image.pixels, 1, 0)
 }
 
 /// The clip level of one of several interleaved channels.

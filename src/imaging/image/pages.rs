@@ -36,8 +36,7 @@ mod tests {
 
     #[test]
     fn pictures_of_a_series_count_and_smaller_copies_do_not() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = Utf8Path::from_path(folder.path()).unwrap().join("a.tif");
+        let (_keep, path) = crate::files::temporary("a.tif", "");
         let of = |kinds: &[u32]| {
             let mut file = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
             for kind in kinds {

@@ -101,30 +101,29 @@ fn parse_thumbnail(bytes: &[u8]) -> Option<Small> {
     whole.then_some(Small { copy: Grey8 { width, height, pixels }, level: Level::Reduced(factor) })
 }
 
-/// The entry: a checksum of the rest, the algorithm, the corners.
+/// A corner: column, row, place, covariance, blur, reach, and whether it is used.
+type Kept = (usize, usize, [f64; 2], Option<[f64; 3]>, Option<f64>, Option<[f64; 2]>, bool);
+
+/// The board that a picture shows instead, and why that is no use.
+type Refused = (Option<String>, String);
+
+/// What an entry holds of a sighting: the corners; of the markers their share of a square, whether they are in the old layout and whether they
+/// are inverted; and the numbers that are open.
+type Seen = (Vec<Kept>, Option<(f64, bool, bool)>, Option<(Vec<Renumbering>, Refused)>);
+
+/// The entry: a checksum of the rest, the algorithm, and what it found.
 fn text(look: &Look) -> String {
-    let mut body = format!("{ALGORITHM}\n");
-    match look {
-        Err(refusal) => body.push_str(&format!("none {}\n", refused(refusal, ' '))),
-        Ok(Sighting { corners, print, open }) => {
-            if let Some(Open { others, refusal }) = open {
-                let others: Vec<String> =
-                    others.iter().map(|o| format!("{},{},{}", o.quarters, o.columns, o.rows)).collect();
-                body.push_str(&format!("open {};{}\n", others.join(" "), refused(refusal, ';')));
-            }
-            if let Some(Print { share, layout, inverted, .. }) = print {
-                let old = u8::from(*layout == Layout::Old);
-                body.push_str(&format!("print {share} {old} {}\n", u8::from(*inverted)));
-            }
-            for (_, _, c) in corners.iter() {
-                let [xx, xy, yy] = c.covariance_px2.map_or([f64::NAN; 3], |s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
-                let (x, y, blur, used) = (c.px.x, c.px.y, c.blur_px.unwrap_or(f64::NAN), u8::from(c.used));
-                let [along_rows, along_columns] = c.reach.unwrap_or([f64::NAN; 2]);
-                let reach = format!("{along_rows} {along_columns}");
-                body.push_str(&format!("{} {} {x} {y} {xx} {xy} {yy} {blur} {reach} {used}\n", c.col, c.row));
-            }
-        }
-    }
+    let refused = |Refusal { reason, seen }: &Refusal| (seen.map(|board| board.to_string()), reason.clone());
+    let look = look.as_ref().map_err(refused).map(|Sighting { corners, print, open }| {
+        let kept = |(_, _, c): (usize, usize, &Corner)| -> Kept {
+            let covariance = c.covariance_px2.map(|s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
+            (c.col, c.row, [c.px.x, c.px.y], covariance, c.blur_px, c.reach, c.used)
+        };
+        let print = print.map(|print| (print.share, print.layout == Layout::Old, print.inverted));
+        let open = open.as_ref().map(|open| (open.others.clone(), refused(&open.refusal)));
+        (corners.iter().map(kept).collect::<Vec<Kept>>(), print, open)
+    });
+    let body = format!("{ALGORITHM}\n{}\n", serde_json::to_string(&look).unwrap_or_default());
     format!("{:032x}\n{body}", xxh3_128(body.as_bytes()))
 }
 
@@ -133,54 +132,40 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     if checksum != format!("{:032x}", xxh3_128(body.as_bytes())) {
         return None;
     }
-    let body = body.strip_prefix(ALGORITHM)?.strip_prefix('\n')?;
-    if let Some(refusal) = body.strip_prefix("none ") {
-        return Some(Err(parse_refused(refusal.strip_suffix('\n')?, ' ', board)?));
-    }
-    let (open, body) = headed(body, "open ", |line| parse_open(line, board))?;
-    let (print, body) = headed(body, "print ", |line| parse_print(line, board))?;
-    let mut grid: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
-    for line in body.lines() {
-        let numbers: Vec<f64> = line.split(' ').map(|n| n.parse().ok()).collect::<Option<_>>()?;
-        let [col, row, x, y, xx, xy, yy, blur, along_rows, along_columns, used] = numbers.try_into().ok()?;
-        let (col, row) = (col as usize, row as usize);
-        if col >= board.columns() || row >= board.rows() || !x.is_finite() || !y.is_finite() {
+    let look: Result<Seen, Refused> = serde_json::from_str(body.strip_prefix(ALGORITHM)?).ok()?;
+    let refusal = |(seen, reason): Refused| Some(Refusal { reason, seen: parse_seen(seen, board)? });
+    let (kept, print, open) = match look {
+        Ok(seen) => seen,
+        Err(refused) => return Some(Err(refusal(refused)?)),
+    };
+    let mut corners: Lattice<Corner> = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
+    for (col, row, [x, y], covariance, blur_px, reach, used) in kept {
+        if col >= board.columns() || row >= board.rows() {
             return None;
         }
-        let covariance_px2 = xx.is_finite().then(|| Matrix2::new(xx, xy, xy, yy));
-        let blur_px = blur.is_finite().then_some(blur);
-        let reach = along_rows.is_finite().then_some([along_rows, along_columns]);
-        let px = Point2::new(x, y);
-        let corner = Corner { col, row, px, covariance_px2, blur_px, reach, used: used != 0.0 };
-        *grid.cells.get_mut(row * board.columns() + col)? = Some(corner);
+        let covariance_px2 = covariance.map(|[xx, xy, yy]| Matrix2::new(xx, xy, xy, yy));
+        let corner = Corner { col, row, px: Point2::new(x, y), covariance_px2, blur_px, reach, used };
+        *corners.cells.get_mut(row * board.columns() + col)? = Some(corner);
     }
-    Some(Ok(Sighting { corners: grid, print, open }))
-}
-
-/// What a line says that begins so, where the text begins with one, and the lines behind it.
-fn headed<'a, T>(body: &'a str, word: &str, parse: impl Fn(&str) -> Option<T>) -> Option<(Option<T>, &'a str)> {
-    let Some(rest) = body.strip_prefix(word) else { return Some((None, body)) };
-    let (line, rest) = rest.split_once('\n')?;
-    Some((Some(parse(line)?), rest))
-}
-
-/// The board that a picture shows instead, and why that is no use.
-fn refused(Refusal { reason, seen }: &Refusal, between: char) -> String {
-    let seen = seen.map_or("-".to_owned(), |board| board.to_string());
-    format!("{seen}{between}{}", reason.replace('\n', " "))
-}
-
-fn parse_refused(text: &str, between: char, board: Board) -> Option<Refusal> {
-    let (seen, reason) = text.split_once(between)?;
-    Some(Refusal { reason: reason.to_owned(), seen: parse_seen(seen, board)? })
+    let print = print.map(|(share, is_old, inverted)| {
+        let layout = match board.layouts()[..] {
+            [only] if !is_old => only,
+            _ if is_old => Layout::Old,
+            _ => Layout::New,
+        };
+        Print { share, pitch: board.pitch(), layout, inverted }
+    });
+    let open = match open {
+        Some((others, refused)) => Some(Open { others, refusal: refusal(refused)? }),
+        None => None,
+    };
+    Some(Ok(Sighting { corners, print, open }))
 }
 
 /// The other board that a picture shows. An entry is for boards of all lengths of one ratio: they are those of the board that is looked for.
-fn parse_seen(text: &str, board: Board) -> Option<Option<Board>> {
-    if text == "-" {
-        return Some(None);
-    }
-    let seen: Board = text.parse().ok()?;
+fn parse_seen(seen: Option<String>, board: Board) -> Option<Option<Board>> {
+    let Some(seen) = seen else { return Some(None) };
+    let seen: Board = seen.parse().ok()?;
     let kind = match (seen.kind, board.kind) {
         (Kind::Charuco { dictionary, layout, .. }, Kind::Charuco { marker_mm, .. }) => {
             Kind::Charuco { marker_mm, dictionary, layout }
@@ -189,27 +174,6 @@ fn parse_seen(text: &str, board: Board) -> Option<Option<Board>> {
         (kind, _) => kind,
     };
     Some(Some(Board { squares: seen.squares, kind, ..board }))
-}
-
-/// From a line of the entry.
-fn parse_open(line: &str, board: Board) -> Option<Open> {
-    let (others, refusal) = line.split_once(';')?;
-    let other = |text: &str| {
-        let [quarters, columns, rows] = text.split(',').collect::<Vec<_>>().try_into().ok()?;
-        Some(Renumbering { quarters: quarters.parse().ok()?, columns: columns.parse().ok()?, rows: rows.parse().ok()? })
-    };
-    let others = others.split_whitespace().map(other).collect::<Option<_>>()?;
-    Some(Open { others, refusal: parse_refused(refusal, ';', board)? })
-}
-
-fn parse_print(line: &str, board: Board) -> Option<Print> {
-    let [share, old, inverted] = line.split(' ').collect::<Vec<_>>().try_into().ok()?;
-    let layout = match board.layouts()[..] {
-        [only] if old == "0" => only,
-        _ if old == "1" => Layout::Old,
-        _ => Layout::New,
-    };
-    Some(Print { share: share.parse().ok()?, pitch: board.pitch(), layout, inverted: inverted == "1" })
 }
 
 #[cfg(test)]
@@ -251,7 +215,7 @@ mod tests {
         for cut in 0..written.len() {
             assert_eq!(parse(&written[..cut], board()), None);
         }
-        assert_eq!(parse(&written.replace("1 0 1.3", "1 0 1.4"), board()), None);
+        assert_eq!(parse(&written.replace("[1,0,[1.3", "[1,0,[1.4"), board()), None);
         for seen in [None, Some("checker:10x7:10".parse().unwrap())] {
             let none: Look = Err(Refusal { reason: "no board found".to_owned(), seen });
             assert_eq!(parse(&text(&none), board()), Some(none));
@@ -267,8 +231,8 @@ mod tests {
 
     #[test]
     fn thumbnails_read_back_and_broken_ones_not_at_all() {
-        let dir = tempfile::tempdir().unwrap();
-        let out = OutDir::open(camino::Utf8Path::from_path(dir.path()).unwrap()).unwrap();
+        let (_keep, path) = crate::files::temporary_folder();
+        let out = OutDir::open(&path).unwrap();
         let cache = Cache { out: &out, thumbnails: true };
         let copy = Grey8 { width: 4, height: 3, pixels: b"\n\n12 4\nP5\xff\0\n".to_vec() };
         let small = Small { copy, level: Level::Reduced(15) };

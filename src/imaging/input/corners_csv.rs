@@ -211,9 +211,7 @@ mod tests {
     }
 
     fn read_of(text: &str, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
-        let dir = tempfile::tempdir().unwrap();
-        let path = Utf8Path::from_path(dir.path()).unwrap().join("corners.csv");
-        std::fs::write(&path, text).unwrap();
+        let (_keep, path) = crate::files::temporary("corners.csv", text);
         read(&path, board, size)
     }
 

@@ -49,7 +49,7 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
         }
         // Kept where it was seen roughly, so that a picture in which nothing could be measured can still be judged.
         let px = detected.level.to_picture(detected.corners.get(col, row)?);
-        Some(Corner { col, row, px, covariance_px2: None, blur_px: None, reach: None, used: false })
+        Some(Corner { used: false, ..Corner::at(col, row, px) })
     })
 }
 

@@ -96,15 +96,9 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             continue;
         }
         let Some((_, count)) = MOVES.iter().find(|(move_, _)| *move_ == name) else { continue };
-        let mut moves_by = Ok(Vec::new());
-        for argument in arguments.iter().take(*count) {
-            let at = unnamed(&code, argument.clone());
-            let held = variables.expression(&code, at, targets);
-            moves_by = moves_by.and_then(|mut all: Vec<usize>| {
-                all.extend(held?);
-                Ok(all)
-            });
-        }
+        let held = |at: &std::ops::Range<usize>| variables.expression(&code, unnamed(&code, at.clone()), targets);
+        let moves_by =
+            arguments.iter().take(*count).map(held).collect::<Result<Vec<_>, Cause>>().map(|all| all.concat());
         let shown = arguments[0].start..arguments[arguments.len().min(*count) - 1].end;
         found.push(Instruction::new(text, word, shown, moves_by));
     }

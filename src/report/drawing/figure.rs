@@ -31,7 +31,7 @@ const COLOURS: [RGBColor; 7] = [
 ];
 
 /// A figure with one pair of axes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plot {
     title: String,
     x_label: String,
@@ -54,15 +54,8 @@ impl Plot {
             title: title.to_owned(),
             x_label: x_label.to_owned(),
             y_label: y_label.to_owned(),
-            series: Vec::new(),
-            guides: Vec::new(),
-            x_range: None,
-            y_range: None,
             size: SIZE,
-            log_y: false,
-            equal_axes: false,
-            y_down: false,
-            whole_x: false,
+            ..Plot::default()
         }
     }
 

@@ -34,20 +34,16 @@ pub fn section(pairs: &[PairPicture]) -> Markup {
 
 fn figure(pair: &PairPicture) -> Markup {
     let longest_px = pair.residuals.iter().map(|(_, r)| r.norm()).fold(1e-9, f64::max);
-    let (w, h) = (pair.jpeg.width, pair.jpeg.height);
     let (mut dots, mut arrows) = (String::new(), String::new());
     for (o, r) in &pair.residuals {
         let at = pair.jpeg.place(o.side, &o.px);
-        let along = r * (LONGEST * f64::from(w) / longest_px);
+        let along = r * (LONGEST * f64::from(pair.jpeg.width) / longest_px);
         let _ = write!(dots, "M{:.1} {:.1}h0", at.x, at.y);
         let _ = write!(arrows, "M{:.1} {:.1}l{:.1} {:.1}", at.x, at.y, along.x, along.y);
     }
-    let svg = format!(
-        "<svg class=\"photo\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"the pair with its corners\">\
-         <image width=\"{w}\" height=\"{h}\" href=\"data:image/jpeg;base64,{}\"/>\
-         <path d=\"{dots}\" stroke=\"#00e5ff\" stroke-width=\"2.4\" stroke-linecap=\"round\"/>\
-         <path d=\"{arrows}\" stroke=\"#ff3b30\" stroke-width=\"1.2\" fill=\"none\"/></svg>",
-        pair.jpeg.base64
+    let drawn = format!(
+        "<path d=\"{dots}\" stroke=\"#00e5ff\" stroke-width=\"2.4\" stroke-linecap=\"round\"/>\
+         <path d=\"{arrows}\" stroke=\"#ff3b30\" stroke-width=\"1.2\" fill=\"none\"/>"
     );
     let caption = format!(
         "Pair {}, the {}: its {} corners, and where the model puts them. The longest arrow is {longest_px:.3} px. Arrows that turn \
@@ -56,5 +52,5 @@ fn figure(pair: &PairPicture) -> Markup {
         pair.role,
         pair.residuals.len()
     );
-    page::figure(&svg, &caption)
+    page::figure(&pair.jpeg.svg("the pair with its corners", &drawn), &caption)
 }

@@ -34,6 +34,15 @@ impl PairJpeg {
         Some(PairJpeg { base64: BASE64_STANDARD.encode(bytes.into_inner()), width, height, scale, places: both })
     }
 
+    /// The pair with what is `drawn` over it, as SVG; `label` says what it shows.
+    pub fn svg(&self, label: &str, drawn: &str) -> String {
+        let PairJpeg { base64, width: w, height: h, .. } = self;
+        format!(
+            "<svg class=\"photo\" viewBox=\"0 0 {w} {h}\" width=\"{w}\" height=\"{h}\" role=\"img\" aria-label=\"{label}\">\
+             <image width=\"{w}\" height=\"{h}\" href=\"data:image/jpeg;base64,{base64}\"/>{drawn}</svg>"
+        )
+    }
+
     /// Where a place in a raw picture lies, px.
     pub fn place(&self, side: Side, px: &Point2<f64>) -> Point2<f64> {
         self.places.place(side, px).map(|v| (v + 0.5) * self.scale - 0.5)

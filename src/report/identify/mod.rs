@@ -10,6 +10,7 @@ use nalgebra::Point3;
 
 use super::Result;
 use super::page::{self, Tone};
+use super::table::short;
 use crate::diagnostic::two_digits;
 use crate::formats::placements::record::PlacementFile;
 use crate::identify::data::dataset::Dataset;
@@ -100,7 +101,7 @@ fn verdict(record: &Record) -> Markup {
     };
     let mean = |spread: Option<&PointSpread>| {
         let of = |s: &PointSpread| s.point.and_then(|p| p.mean_abs_mm).or(s.distance.mean_abs_mm);
-        spread.and_then(of).map_or_else(|| "n/a".to_owned(), two_digits)
+        short(spread.and_then(of))
     };
     let (before, after) = (record.before.judged(), record.chosen_method().map(|m| m.quality.judged()));
     let what = if before.point.is_some() { "position" } else { "distance" };

@@ -4,19 +4,17 @@ use maud::{Markup, html};
 
 use crate::diagnostic::two_digits;
 use crate::formats::placements::record::{PlacementFile, TransformRecord};
-use crate::geometry::rotation_vector;
 use crate::report::page;
+use crate::report::table::short;
 
 /// Turn in degrees and shift in mm, three numbers each, and their standard deviations.
 fn cells(record: &TransformRecord) -> Vec<String> {
-    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
-    let turn = record.transform().map(|t| three(rotation_vector(&t).map(f64::to_degrees).into(), 4));
-    let [turn_rad, shift_mm] = record.sigmas();
+    let ((shift, turn), [turn_rad, shift_mm]) = (record.words(), record.sigmas());
     vec![
-        three(record.translation_mm, 3),
-        shift_mm.map_or_else(|| "n/a".to_owned(), two_digits),
+        shift,
+        short(shift_mm),
         turn.unwrap_or_else(|| "not in the readings".to_owned()),
-        turn_rad.map_or_else(|| "n/a".to_owned(), |rad| two_digits(rad.to_degrees())),
+        short(turn_rad.map(f64::to_degrees)),
     ]
 }
 
@@ -31,7 +29,7 @@ pub(super) fn section(placement: &PlacementFile, by_cameras: bool) -> Markup {
         row.extend([
             two_digits(group.error_mm.mean_mm),
             two_digits(group.error_mm.p95_mm),
-            group.held_out.mean_abs_mm.map_or_else(|| "n/a".to_owned(), two_digits),
+            short(group.held_out.mean_abs_mm),
         ]);
         row
     });

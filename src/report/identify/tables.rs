@@ -8,7 +8,7 @@ use crate::identify::judge::errors::{RowError, Spread};
 use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{MethodRecord, ParameterRecord, PointSpread, Record};
 use crate::report::page;
-use crate::report::table::{number, with_sigma};
+use crate::report::table::{number, short, with_sigma};
 
 /// Rows in the table of the worst.
 const WORST: usize = 10;
@@ -84,14 +84,13 @@ pub(super) fn verification_table(record: &Record) -> Markup {
     };
     let methods = record.methods.iter().map(|m| (named(m), m.quality.judged()));
     let robots: Vec<(String, &PointSpread)> = std::iter::once(("before".to_owned(), before)).chain(methods).collect();
-    let mm = |figure: Option<f64>| figure.map_or_else(|| "n/a".to_owned(), two_digits);
     let row = |(name, s): &(String, &PointSpread)| {
         let better = gain(&before.distance, &s.distance).filter(|_| name != "before").unwrap_or_default();
         let Spread { mean_abs_mm, std_mm, max_abs_mm, min_abs_mm, .. } = s.distance;
         let points = [s.point.and_then(|p| p.mean_abs_mm), s.point.and_then(|p| p.max_abs_mm)];
-        let distances = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].map(mm);
+        let distances = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].map(short);
         let cells = std::iter::once(name.clone()).chain(distances).chain(std::iter::once(better));
-        cells.chain(points.map(mm)).collect()
+        cells.chain(points.map(short)).collect()
     };
     let rows: Vec<Vec<String>> = robots.iter().map(row).collect();
     html! {
@@ -193,8 +192,7 @@ pub(super) fn joint_table(record: &Record) -> Markup {
 pub(super) fn judged_table(record: &Record) -> Markup {
     let row = |j: &crate::identify::run::Judged| {
         let mark = if j.terms == record.terms { " (kept)" } else { "" };
-        let held_out = j.held_out_mm.map_or_else(|| "n/a".to_owned(), two_digits);
-        vec![j.model.to_owned(), format!("{}{mark}", j.terms), held_out]
+        vec![j.model.to_owned(), format!("{}{mark}", j.terms), short(j.held_out_mm)]
     };
     let rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
     if rows.is_empty() {

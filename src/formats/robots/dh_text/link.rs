@@ -23,7 +23,7 @@ pub(super) const KEYS: [&[&str]; 4] = [
     &["d", "link_offset"],
 ];
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Link {
     pub line: u64,
     pub depth: usize,
@@ -44,17 +44,7 @@ pub(super) struct Link {
 impl Link {
     /// One that has nothing yet.
     pub fn at(line: u64, depth: usize) -> Link {
-        Link {
-            line,
-            depth,
-            call: false,
-            values: [None; 4],
-            offset: None,
-            limits: None,
-            slides: false,
-            flipped: false,
-            convention: None,
-        }
+        Link { line, depth, ..Link::default() }
     }
 
     /// Alpha, a, theta and d, zero where nothing says otherwise. What a call makes moves, whatever its theta says.

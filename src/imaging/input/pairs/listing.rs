@@ -6,11 +6,9 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::names::natural_order;
+use crate::files::provenance::picture_format;
 use crate::files::{self, OutDir};
 use crate::imaging::{Error, Result};
-
-/// Extensions of pictures, in small letters; those that lose nothing first.
-const EXTENSIONS: [&str; 8] = ["png", "tif", "tiff", "bmp", "pgm", "pnm", "jpg", "jpeg"];
 
 /// Levels below a folder, and folders there, that are looked into: enough for any set of pictures, and an end where the folder that was
 /// named is a whole disk.
@@ -69,10 +67,9 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
         if path.file_name().is_some_and(|name| name.starts_with('.')) {
             continue;
         }
-        let extension = path.extension().map(str::to_ascii_lowercase);
         if path.is_dir() {
             entries.folders.push(path);
-        } else if extension.is_some_and(|e| EXTENSIONS.contains(&e.as_str())) {
+        } else if picture_format(&path).is_some() {
             entries.pictures.push(path);
         } else {
             entries.aside.other += 1;
@@ -88,12 +85,8 @@ pub fn list(folder: &Utf8Path) -> Result<Folder> {
 
 /// Keeps one picture of those of one name, the first in the format that loses least; how many went.
 fn once(pictures: &mut Vec<Utf8PathBuf>) -> usize {
-    let rank = |path: &Utf8Path| {
-        let extension = path.extension().map(str::to_ascii_lowercase);
-        EXTENSIONS.iter().position(|known| extension.as_deref() == Some(known))
-    };
     let before = pictures.len();
-    pictures.sort_by_key(|path| (path.with_extension(""), rank(path)));
+    pictures.sort_by_key(|path| (path.with_extension(""), picture_format(path)));
     pictures.dedup_by_key(|path| path.with_extension(""));
     pictures.sort();
     before - pictures.len()

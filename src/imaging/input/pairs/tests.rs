@@ -3,18 +3,18 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::{PairBy, Pairing, Source};
+use crate::files::temporary_folder;
 use crate::imaging::Result;
 
 /// A folder with empty files of these names.
 pub fn folder<S: AsRef<str>>(names: &[S]) -> (tempfile::TempDir, Utf8PathBuf) {
-    let dir = tempfile::tempdir().unwrap();
-    let path = Utf8Path::from_path(dir.path()).unwrap().to_owned();
+    let (keep, path) = temporary_folder();
     for name in names {
         let file = path.join(name.as_ref());
         std::fs::create_dir_all(file.parent().unwrap()).unwrap();
         std::fs::write(file, "").unwrap();
     }
-    (dir, path)
+    (keep, path)
 }
 
 /// The folder read by itself.
