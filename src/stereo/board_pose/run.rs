@@ -197,7 +197,7 @@ impl<'a> Run<'a> {
         let moves = present.iter().filter_map(|&i| {
             Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
         });
-        let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY };
+        let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY, grows: false };
         let moves_mm = median(moves).unwrap_or(0.0);
         Some(Judgement::Contradicts(Changed {
             explanations: vec![explanation],

@@ -9,6 +9,7 @@
 pub mod common_misfit;
 pub mod hypothesis;
 mod one_side;
+mod rolling_shutter;
 pub mod series;
 pub mod standing;
 #[cfg(test)]

@@ -10,6 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::stereo::model::Layout;
 use crate::stereo::solve::Problem;
+use crate::stereo::solve::normal_equations::Block;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Fewest pairs for which the board's place is a nuisance: three numbers more must leave some for the scatter.
@@ -72,10 +73,18 @@ impl Linear {
     /// The pairs of a problem at its minimum. `None` where they do not determine the shared numbers.
     pub fn new(problem: &Problem, layout: &Layout) -> Option<Linear> {
         let equations = problem.equations(layout)?;
-        let reduced = equations.blocks.iter().map(|block| block.reduced(0.0)).collect::<Option<Vec<_>>>()?;
-        let (matrices, gradients): (Vec<_>, Vec<_>) = reduced.into_iter().unzip();
-        let sum = matrices.iter().fold(equations.prior.matrix.clone(), |sum, m| sum + m);
-        let inverse = invert(&sum)?;
+        Linear::of(&equations.blocks, &equations.prior.matrix, problem)
+    }
+
+    /// The same from the pairs' shares of the normal equations, which may have numbers beyond the shared ones: those are zero but for a change. `prior`
+    /// is what is expected of the shared ones.
+    pub fn of(blocks: &[Block], prior: &DMatrix<f64>, problem: &Problem) -> Option<Linear> {
+        let reduced = blocks.iter().map(|block| block.reduced(0.0)).collect::<Option<Vec<_>>>()?;
+        let (matrices, gradients): (Vec<DMatrix<f64>>, Vec<_>) = reduced.into_iter().unzip();
+        let (known, all) = (prior.nrows(), matrices.first()?.nrows());
+        let sum = matrices.iter().fold(prior.clone(), |sum, m| sum + m.view((0, 0), (known, known)));
+        let mut inverse = DMatrix::zeros(all, all);
+        inverse.view_mut((0, 0), (known, known)).copy_from(&invert(&sum)?);
         let centres: Vec<[f64; 3]> = problem.values.poses.iter().map(|pose| pose.translation.vector.into()).collect();
         let count = centres.len() as f64;
         let mean = |k: usize| centres.iter().map(|c| c[k]).sum::<f64>() / count;

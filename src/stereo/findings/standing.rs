@@ -6,10 +6,12 @@
 //! to its own size (GUM, F.2.4.5). Of a rig that drifts the middle of the series is known best: the rig is that one, and what it drifted
 //! since then goes into what is measured later.
 
+use nalgebra::DVector;
+
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by_pairs, calibrate_with};
-use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, without_drift};
+use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, rolling_shutter, without_drift};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
@@ -36,9 +38,16 @@ pub struct Asked {
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let fitting = |corners: &Corners| standing(corners, asked).ok().map(|(found, _)| found.views.len());
-    let (found, mut told) = standing(corners, asked).map_err(|error| one_side::explain(error, corners, fitting))?;
-    let common = common_misfit::look(&found, &told);
-    told.extend(common);
+    let (mut found, mut told) = standing(corners, asked).map_err(|error| one_side::explain(error, corners, fitting))?;
+    let of_rig = |found: &Calibration| lengths(found, asked.extent);
+    match rolling_shutter::look(&found, of_rig) {
+        // Of corners that were moved back by a drift nothing more is asked.
+        Some((rolling, step)) if found.since_moment.is_empty() && rolling.material(asked.tolerance_mm) => {
+            allow_for(&mut found, &[step]);
+            told.push(rolling);
+        }
+        _ => told.extend(common_misfit::look(&found, &told)),
+    }
     Ok((found, told))
 }
 
@@ -256,14 +265,19 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
                 within.push(along.to_last());
             }
         }
-        within.iter().for_each(|step| found.uncertainty.shared += step * step.transpose());
-        let matrix = found.uncertainty.shared.clone();
-        found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
+        allow_for(found, &within);
     }
     let fewer = 2 * change.pairs.len() < found.views.len();
     if change.kind == Kind::Step && change.material(asked.tolerance_mm) && fewer {
         found.standing.unconfirmed = change.pairs.clone();
     }
+}
+
+/// Adds steps that the rig may be off by to its uncertainty.
+fn allow_for(found: &mut Calibration, steps: &[DVector<f64>]) {
+    steps.iter().for_each(|step| found.uncertainty.shared += step * step.transpose());
+    let matrix = found.uncertainty.shared.clone();
+    found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
 }
 
 /// The last pairs, where they are left out because they contradict the others: the rig may no longer stand.

@@ -3,13 +3,15 @@
 use nalgebra::Vector3;
 
 use crate::geometry::transform;
-use crate::imaging::{Corners, PairCorners};
+use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::findings::{Finding, Kind, hold};
+use crate::stereo::judge::ledger::Standards;
+use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
-use crate::stereo::synthetic::{BROWN4, World};
+use crate::stereo::synthetic::{BROWN4, World, judged};
 use crate::stereo::volume::Extent;
 
 /// The paper's rig, and the same at a fifth of its pixels.
@@ -280,4 +282,65 @@ fn what_changed_is_held() {
     assert!(said("unknown") == said("focus|camera-moved") && said("other-board").is_empty());
     let pairs = ["0017".to_owned(), "0018".to_owned()];
     assert!(hold("unknown", Some(&pairs)).unwrap().ends_with("or `--since 0017`: the rig of the last 2 pairs"));
+}
+
+/// The corners where the board of each pair goes by `way_mm` while a picture is read out, row by row.
+fn rolled(world: &World, seed: u64, way_mm: Vector3<f64>) -> Corners {
+    let mut corners = world.corners(seed);
+    for (pair, pose) in corners.pairs.iter_mut().zip(&world.poses) {
+        for (side, list) in [(Side::Left, &mut pair.left), (Side::Right, &mut pair.right)] {
+            let height = f64::from(world.rig.camera(side).height);
+            for corner in list {
+                let still = pose * world.board.corner_mm(corner.col, corner.row);
+                let at = |late: f64| {
+                    let (left, right) = world.rig.project(&(still + way_mm * late));
+                    if side == Side::Left { left } else { right }
+                };
+                let late = (0..5).fold(0.0, |late, _| (at(late).y + 0.5) / height - 0.5);
+                corner.px += at(late) - at(0.0);
+            }
+        }
+    }
+    corners
+}
+
+fn of_rows(told: &[Finding]) -> Option<&Finding> {
+    told.iter().find(|finding| finding.action.contains("rolling shutter"))
+}
+
+#[test]
+fn a_board_that_moves_while_rows_are_read_out_is_named() {
+    for mm in [0.2, 1.0] {
+        let world = World { sigma_px: 0.01, ..World::new(16, 3) };
+        let (found, told) = standing(&rolled(&world, 4, Vector3::y() * mm));
+        let named = of_rows(&told).unwrap_or_else(|| panic!("{mm}: {told:?}"));
+        assert_eq!(named.cause, Cause::NotSimultaneous.word());
+        let size = named.size.unwrap();
+        assert!((size / mm - 1.0).abs() < 0.3, "{mm}: {named:?}");
+        let verdict = judged(&found, told.clone(), Standards::default(), 0.05).verdict;
+        assert!(mm < 1.0 || verdict != Verdict::Pass, "{mm}: {named:?}");
+    }
+}
+
+#[test]
+fn what_looks_like_rows_at_two_moments_at_one_distance_is_not_taken_for_it() {
+    let world = World { sigma_px: 0.01, ..World::new(16, 3) };
+    let zoomed = |fy: f64| {
+        let mut zoomed = world.clone();
+        [&mut zoomed.rig.left, &mut zoomed.rig.right].into_iter().for_each(|camera| camera.fy *= fy);
+        zoomed.corners(5)
+    };
+    let pictures = |change: fn(&mut Corner)| {
+        let mut corners = world.corners(5);
+        let both = corners.pairs.iter_mut().flat_map(|pair| pair.left.iter_mut().chain(&mut pair.right));
+        both.for_each(change);
+        corners
+    };
+    let skew = pictures(|corner| corner.px.x += 0.002 * corner.px.y);
+    let wide = World { board: Board { stretch: 1.002, ..world.board }, ..world.clone() };
+    let wide = Corners { board: world.board, ..wide.corners(5) };
+    for (what, corners) in [("a zoom", zoomed(1.3)), ("skew sensors", skew), ("a board too wide", wide)] {
+        let (_, told) = standing(&corners);
+        assert_eq!(of_rows(&told), None, "{what}");
+    }
 }

@@ -3,9 +3,9 @@
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::*;
-use crate::imaging::Board;
+use crate::imaging::{Board, Side};
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
-use crate::stereo::board_pose::rig_change::cause::Cause;
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::series;
 use crate::stereo::board_pose::{Knowledge, Seen};
@@ -189,4 +189,37 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
         }
     }
     assert!(kept > 0);
+}
+
+/// A lens that warms up during the run: what its poses have in common looks like another change as well, and is named as what it is.
+#[test]
+fn a_focus_that_creeps_is_not_named_as_something_that_all_poses_have() {
+    for ppm in [20.0, 100.0, 500.0] {
+        for seed in 50..54 {
+            let mut world = World { sigma_px: 0.002, ..World::new(14, seed) };
+            let found = calibrate(&world.corners(seed + 10), &BROWN4).unwrap();
+            world.board = Board::checker("7x6".parse().unwrap(), 10.0);
+            let mut corners = world.corners(seed + 20);
+            for i in 0..14 {
+                let by = 1.0 + 1e-6 * ppm * i as f64 / 13.0;
+                let mut warmer = world.clone();
+                (warmer.rig.right.fx, warmer.rig.right.fy) = (world.rig.right.fx * by, world.rig.right.fy * by);
+                corners.pairs[i] = warmer.corners(seed + 20).pairs[i].clone();
+            }
+            let known = Knowledge {
+                noise: Some(found.own_noise),
+                pair_excess: Some(pair_excess(&found)),
+                farthest_pair: farthest_pair(&found),
+                ..known(found.rig(), world.board)
+            };
+            match series::measure(&known, run_of(corners)).judgement {
+                Judgement::Allowed(changed) | Judgement::Contradicts(changed) => {
+                    let is = |e: &Explanation| e.cause == Cause::Focal(Side::Right);
+                    assert!(changed.explanations.iter().any(is), "{ppm}, {seed}: {changed:?}");
+                }
+                Judgement::Agrees | Judgement::Moved { creeps: true, .. } => {}
+                other => panic!("{ppm}, {seed}: {other:?}"),
+            }
+        }
+    }
 }

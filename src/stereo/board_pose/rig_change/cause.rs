@@ -4,17 +4,22 @@
 //! right camera turns about its own centre or is pushed, a lens is refocused. A longer baseline and smaller squares explain the same:
 //! pictures have no scale of their own, so both are named.
 
+use std::ops::AddAssign;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::geometry::nearest_rotation;
 use crate::imaging::Board;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::rig_change::consistency::shares_that_grow;
 use crate::stereo::board_pose::solve::bundle::Bundle;
 use crate::stereo::board_pose::solve::estimate::Estimate;
+use crate::stereo::board_pose::solve::pose_block::PoseBlock;
 use crate::stereo::board_pose::solve::prior::{stretch_length_mm, stretch_mode};
 use crate::stereo::data::observation::Side;
 use crate::stereo::findings::hypothesis::{moved, refocused, turned};
 use crate::stereo::model::Layout;
+use crate::stereo::solve::Loss;
 
 /// One thing that may have changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,6 +119,16 @@ pub struct Explanation {
     pub sigma: f64,
     /// By how much chi-square falls with it.
     pub fall: f64,
+    /// True where it grows from the first pose to the last, up to this amount, false where all poses have it.
+    pub grows: bool,
+}
+
+impl Explanation {
+    /// In words.
+    pub fn describe(&self, rig: &Rig, board: &Board) -> String {
+        let words = self.cause.describe(self.amount, rig, board);
+        if self.grows { format!("{words}, little by little from the first pose to the last") } else { words }
+    }
 }
 
 /// Every cause at the common minimum, by its score.
@@ -134,13 +149,46 @@ fn of_rig(found: &Estimate<'_>, cause: Cause, direction: &DVector<f64>) -> Optio
     let own = direction.dot(&(&normal.told.rig * direction));
     let curvature = own - shared.dot(&(&found.covariance * &shared));
     let gradient = direction.dot(&normal.told.rig_gradient);
+    of_sums(cause, own, curvature, gradient, false)
+}
+
+fn of_sums(cause: Cause, own: f64, curvature: f64, gradient: f64, grows: bool) -> Option<Explanation> {
     // What nothing tells apart from the poses or from what was unknown before leaves only rounding.
     (curvature > 1e-9 * own).then(|| Explanation {
         cause,
         amount: -gradient / curvature,
         sigma: 1.0 / curvature.sqrt(),
         fall: gradient * gradient / curvature,
+        grows,
     })
+}
+
+/// The rig's causes as changes that grow evenly from the first pose to the last.
+pub(in crate::stereo::board_pose) fn growing(found: &Estimate<'_>) -> Option<Vec<Explanation>> {
+    let scene = found.bundle.scene(&found.values);
+    let (causes, directions): (Vec<Cause>, Vec<DVector<f64>>) =
+        Cause::ALL.into_iter().filter_map(|cause| Some((cause, cause.direction(&scene.rig)?))).unzip();
+    let directions = DMatrix::from_columns(&directions).transpose();
+    let (all, n) = (causes.len(), found.values.rig.len());
+    let (mut own, mut gradient) = (DMatrix::zeros(all, all), DVector::zeros(all));
+    let mut shared = DMatrix::zeros(all, found.covariance.nrows());
+    for (i, share) in shares_that_grow(&found.normal)?.into_iter().enumerate() {
+        let (Some(part), Some(pose)) = (&found.normal.poses[i], &found.values.poses[i]) else { continue };
+        let sums = PoseBlock::of(&scene, pose, &found.bundle.views[i], Loss::Squared)?.shared;
+        let (by_rig, by_pose) = (&directions * sums.rig(), &directions * part.rig_mixed);
+        let through = &by_pose * part.pose_inverse;
+        own += (&by_rig * directions.transpose() - &through * by_pose.transpose()) * (share * share);
+        gradient += (&directions * sums.rig_gradient - &through * part.pose_gradient) * share;
+        let mut by_shared = -(&through * part.mixed.transpose());
+        by_shared.columns_mut(0, n).add_assign(&(&by_rig * &found.bundle.rig.basis));
+        for (k, crossing) in sums.crossings.iter().enumerate() {
+            by_shared.columns_mut(n + 3 * k, 3).add_assign(&(&directions * crossing.rig));
+        }
+        shared += by_shared * share;
+    }
+    let curvature = &own - &shared * &found.covariance * shared.transpose();
+    let of = |(k, cause)| of_sums(cause, own[(k, k)], curvature[(k, k)], gradient[k], true);
+    Some(causes.into_iter().enumerate().filter_map(of).collect())
 }
 
 fn of_pitch(found: &Estimate<'_>) -> Option<Explanation> {
@@ -153,6 +201,7 @@ fn of_pitch(found: &Estimate<'_>) -> Option<Explanation> {
         amount: amount * before / told,
         sigma: sigma * (before / told).sqrt(),
         fall: amount * amount / told,
+        grows: false,
     })
 }
 

@@ -66,11 +66,9 @@ pub fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Chang
 
 /// The change along the run that gains most: from one pose on, or growing from the first to the last.
 pub fn along(normal: &Normal, covariance: &DMatrix<f64>) -> Option<Along> {
-    let present: Vec<usize> = (0..normal.poses.len()).filter(|&i| normal.poses[i].is_some()).collect();
-    let [first, .., last] = present[..] else { return None };
+    let first = normal.poses.iter().position(Option::is_some)?;
+    let growing = shares_that_grow(normal)?;
     let whole = Sums::of(normal, &vec![1.0; normal.poses.len()]).score(covariance)?.fall;
-    let growing: Vec<f64> =
-        (0..normal.poses.len()).map(|i| i.saturating_sub(first) as f64 / (last - first) as f64).collect();
     let creep = Sums::of(normal, &growing).score(covariance);
     let (from, step) = from_one_on(normal, covariance, first)?;
     let (change, shares, creeps) = match creep {
@@ -79,10 +77,17 @@ pub fn along(normal: &Normal, covariance: &DMatrix<f64>) -> Option<Along> {
     };
     let gain = change.fall - whole;
     let rest: f64 = left(normal, covariance, &change.change, &shares).iter().flatten().map(|c| c.fall).sum();
-    let freedom = (NUMBERS * (present.len() as f64 - 2.0)).max(1.0);
+    let freedom = (NUMBERS * (normal.poses.iter().flatten().count() as f64 - 2.0)).max(1.0);
     let evidence = freedom * (1.0 + gain.max(0.0) / rest.max(f64::MIN_POSITIVE)).ln();
     let from = if creeps { first } else { from };
     Some(Along { change, shares, from, creeps, gain, evidence })
+}
+
+/// Which share each pose has of a change that grows evenly from the first that takes part to the last. `None` where there are no two.
+pub fn shares_that_grow(normal: &Normal) -> Option<Vec<f64>> {
+    let first = normal.poses.iter().position(Option::is_some)?;
+    let last = normal.poses.iter().rposition(Option::is_some).filter(|last| *last > first)?;
+    Some((0..normal.poses.len()).map(|i| i.saturating_sub(first) as f64 / (last - first) as f64).collect())
 }
 
 /// Where a change from one pose on gains most, and what: the index of its first pose.

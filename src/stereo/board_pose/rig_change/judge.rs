@@ -10,7 +10,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::geometry::Transform;
 use crate::statistics::median;
-use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, shifts_mm, stretch};
+use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, explanations, growing, shifts_mm, stretch};
 use crate::stereo::board_pose::solve::bundle::{Bundle, Values};
 use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
@@ -71,6 +71,7 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(&(least, first)) = fitted.first() else { return (found, None) };
     let equals = fitted.iter().filter(|(d, _)| d - least <= AS_LIKELY).map(|(_, e)| *e).collect();
+    let equals = with_growing(&found, best, equals);
     // The change is allowed for as something of the rig: with a pitch that is off instead, the points stay where they are.
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
@@ -92,6 +93,17 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
         Some(allowed) => (allowed, Some(changed)),
         None => (free, Some(changed)),
     }
+}
+
+/// The causes with those that grow along the run before them, where one of those explains more than any that the whole run has: `best` is by how much
+/// the best of these lowers chi-square.
+fn with_growing(found: &Estimate<'_>, best: f64, equals: Vec<Explanation>) -> Vec<Explanation> {
+    let mut growing = growing(found).unwrap_or_default();
+    growing.sort_by(|a, b| b.fall.total_cmp(&a.fall));
+    let Some(most) = growing.first().map(|e| e.fall).filter(|most| *most > best) else { return equals };
+    growing.retain(|e| most - e.fall <= AS_LIKELY);
+    growing.extend(equals.into_iter().filter(|_| most - best <= AS_LIKELY));
+    growing
 }
 
 /// By how much chance alone lowers chi-square. Where the poses scatter more than the pairs of the calibration did, by how much is known from as

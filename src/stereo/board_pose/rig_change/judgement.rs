@@ -134,7 +134,7 @@ impl Judgement {
 }
 
 fn causes(changed: &Changed, rig: &Rig, board: &Board) -> String {
-    let one = |e: &Explanation| unit_of(e, rig).unwrap_or_else(|| e.cause.describe(e.amount, rig, board));
+    let one = |e: &Explanation| unit_of(e, rig).unwrap_or_else(|| e.describe(rig, board));
     let all: Vec<String> = changed.explanations.iter().map(one).collect();
     all.join(", or ")
 }
