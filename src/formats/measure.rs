@@ -205,7 +205,7 @@ impl RigRecord {
             Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
         };
         let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {
-            what: e.cause.describe(e.amount, rig, board),
+            what: e.describe(rig, board),
             amount: e.amount,
             unit: e.cause.unit(),
             sigma: e.sigma,
