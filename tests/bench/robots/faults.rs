@@ -30,7 +30,7 @@ const FAULTS: [(&str, &[f64], Plant, &str); 30] = [
     // Half a turn of the shoulder is the base's axis counted the other way round, and may be called that.
     ("joint off by, deg", &[180.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "joint"),
     ("joint off by, deg", &[90.0, -90.0], |rows, _, by| joints(rows, |_, j| j[1] += by), "offset by"),
-    ("joints a row late", &[0.0], |rows, _, _| late(rows), "lag"),
+    ("joints a row late", &[0.0], |rows, _, _| late(rows), "do not belong together"),
     ("standard DH", &[0.0], |_, robot, _| *robot = as_standard(robot), "standard DH"),
     ("mirrored", &[0.0], |rows, _, _| points(rows, |_, p| p.y = -p.y), "mirrored"),
     ("scaled by", &[0.998, 1.01, 1.1], |rows, _, by| points(rows, |_, p| p.coords *= by), "all links"),
