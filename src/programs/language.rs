@@ -42,6 +42,24 @@ impl Language {
         Language::ALL.into_iter().find(|language| language.known().1.contains(&ending.as_str()))
     }
 
+    /// The language of a text whose file has another ending, by what every program of it begins with or holds; and the ending that says it.
+    pub fn seen_in(text: &str) -> Option<(Language, &'static str)> {
+        let starts = |word: &str| text.lines().any(|line| line.trim_start().starts_with(word));
+        let calls = |word: &str| text.lines().any(|line| line.trim_start().starts_with(&format!("{word}(")));
+        let ends = |word: &str| text.lines().any(|line| line.trim() == word);
+        let found = match () {
+            () if starts("def ") && ends("end") && (calls("movej") || calls("movel") || calls("movep")) => {
+                Language::UrScript
+            }
+            () if starts("MODULE ") && ends("ENDMODULE") => Language::Rapid,
+            () if starts("&ACCESS") || starts("DEF ") && ends("END") => Language::Krl,
+            () if starts("/PROG") && starts("/MN") => Language::FanucLs,
+            () if ends("/JOB") && ends("//INST") => Language::Jbi,
+            () => return None,
+        };
+        Some((found, found.known().1[0]))
+    }
+
     /// What the language calls the number behind the six axes of a robot; `None` where all are in one list.
     pub fn seventh(self) -> Option<&'static str> {
         self.known().2
@@ -50,6 +68,28 @@ impl Language {
     /// Whether points of this file stand in one of data beside it.
     pub fn has_data_file(self, path: &Utf8Path) -> bool {
         self == Language::Krl && path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("src"))
+    }
+}
+
+/// The language of a program that is none of those that are read: by the ending of its file, or by what stands in it.
+pub fn unread(path: &Utf8Path, text: &str) -> Option<&'static str> {
+    const BY_ENDING: [(&str, &str); 9] = [
+        ("drl", "Doosan DRL"),
+        ("as", "Kawasaki AS"),
+        ("pg", "Kawasaki AS"),
+        ("pgx", "Staubli VAL 3"),
+        ("tp", "Fanuc TP, which only the controller reads"),
+        ("urp", "PolyScope, which only the controller reads"),
+        ("lua", "Lua"),
+        ("py", "Python"),
+        ("m", "MATLAB"),
+    ];
+    let has = |word: &str| text.lines().any(|line| line.trim_start().starts_with(word));
+    let ending = path.extension().map(str::to_ascii_lowercase);
+    match () {
+        () if has(".PROGRAM ") => Some("Kawasaki AS"),
+        () if has("from DRCF import") || has("movej(posj(") => Some("Doosan DRL"),
+        () => BY_ENDING.iter().find(|(known, _)| ending.as_deref() == Some(known)).map(|(_, name)| *name),
     }
 }
 

@@ -22,5 +22,5 @@ pub use dialect::program;
 pub use encoding::{Encoding, decoded};
 pub use instruction::{Cause, Instruction};
 pub use joint_order::JointOrder;
-pub use language::{Joints, Language, Motion, Stop, Target};
+pub use language::{Joints, Language, Motion, Stop, Target, unread};
 pub use read::{Program, edited, targets, with_readings};

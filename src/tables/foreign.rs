@@ -10,17 +10,18 @@ use serde_json::Value;
 pub(super) fn of_bytes(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, String)> {
     const MATLAB: &str = "in MATLAB: `writematrix(NAME, 'table.csv')` for each array that is needed, joints and points; \
                           in Python: `numpy.savetxt('table.csv', scipy.io.loadmat('FILE.mat')['NAME'], delimiter=',')`";
+    let table = table_of(path);
     let has_extension = |known: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(known));
     if bytes.starts_with(b"MATLAB ") || has_extension("mat") {
-        return Some(("a MATLAB file (.mat)", MATLAB.to_owned()));
+        return Some(("a MATLAB file (.mat)", MATLAB.replace("table.csv", &table)));
     }
     if bytes.starts_with(b"\x89HDF\r\n\x1a\n") {
         let hint = "export the arrays that are needed as CSV, e.g. with `h5dump -y -w 0 -d NAME`";
         return Some(("an HDF5 file", hint.to_owned()));
     }
     if bytes.starts_with(b"\x93NUMPY") {
-        let hint = "in Python: `numpy.savetxt('table.csv', numpy.load('FILE.npy'), delimiter=',')`";
-        return Some(("a NumPy file", hint.to_owned()));
+        let hint = format!("in Python: `numpy.savetxt('{table}', numpy.load('FILE.npy'), delimiter=',')`");
+        return Some(("a NumPy file", hint));
     }
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let begins = text.iter().find(|b| !b.is_ascii_whitespace());
@@ -29,19 +30,20 @@ pub(super) fn of_bytes(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, S
         // A list of lists of numbers is a table.
         let rows = value.as_ref().and_then(Value::as_array).is_some_and(|list| !list.iter().any(Value::is_object));
         if has_extension("json") || value.is_some() && !rows {
-            return Some(("a JSON file", of_json(&value.unwrap_or_default(), path.file_name().unwrap_or_default())));
+            return Some(("a JSON file", of_json(&value.unwrap_or_default(), path)));
         }
     }
     bytes.starts_with(&[0x1f, 0x8b]).then(|| ("a compressed file", "unpack it first: `gunzip FILE`".to_owned()))
 }
 
 /// The line that makes a table of a JSON file: of its longest list of records, of records with names, or of a list for each column.
-fn of_json(value: &Value, file: &str) -> String {
+fn of_json(value: &Value, path: &Utf8Path) -> String {
+    let (file, table) = (path.file_name().unwrap_or_default(), table_of(path));
     let loaded = format!("json.load(open('{file}'))");
     let columns = |v: &Value| v.as_object().is_some_and(|o| !o.is_empty() && o.values().all(Value::is_array));
     let named = |v: &Value| v.as_object().is_some_and(|o| o.len() > 1 && o.values().all(Value::is_object));
     if by_columns(value) {
-        return format!("in Python: `import pandas; pandas.read_json('{file}').to_csv('table.csv', index=False)`");
+        return format!("in Python: `import pandas; pandas.read_json('{file}').to_csv('{table}', index=False)`");
     }
     let frame = match longest_list(value) {
         Some((_, keys)) if keys.is_empty() => format!("json_normalize({loaded})"),
@@ -50,7 +52,7 @@ fn of_json(value: &Value, file: &str) -> String {
         None if columns(value) => format!("DataFrame({loaded})"),
         None => format!("json_normalize({loaded})"),
     };
-    in_python("json", &frame)
+    in_python("json", &frame, path)
 }
 
 /// Whether it is what `DataFrame.to_json` writes: columns by name, of each the values by the rows' numbers.
@@ -66,8 +68,13 @@ fn by_columns(value: &Value) -> bool {
     lengths.is_some_and(|lengths| lengths.len() > 1 && lengths.iter().all(|length| *length == lengths[0]))
 }
 
-fn in_python(package: &str, frame: &str) -> String {
-    format!("in Python: `import {package}, pandas; pandas.{frame}.to_csv('table.csv', index=False)`")
+/// What the table of a file is called: each has its own, so that none takes the place of another.
+fn table_of(path: &Utf8Path) -> String {
+    format!("{}.csv", path.file_stem().unwrap_or("table"))
+}
+
+fn in_python(package: &str, frame: &str, path: &Utf8Path) -> String {
+    format!("in Python: `import {package}, pandas; pandas.{frame}.to_csv('{}', index=False)`", table_of(path))
 }
 
 /// The longest list of records, with the keys that lead to it.
@@ -88,7 +95,16 @@ fn longest_list(value: &Value) -> Option<(usize, Vec<&str>)> {
 
 /// How a table is made of a YAML file; `None` of another text, and of a list of rows of numbers.
 pub(super) fn of_yaml(text: &str, path: &Utf8Path) -> Option<String> {
-    let is_comment = |line: &&str| line.trim().is_empty() || line.starts_with(['#', '%']) || line.starts_with("---");
+    let file = path.file_name().unwrap_or_default();
+    if let Some((name, count)) = opencv_matrices(text) {
+        let (digits, numbers) = if count > 1 { (" % i", format!("range({count})")) } else { ("", "[0]".to_owned()) };
+        return Some(format!(
+            "in Python: `import cv2, numpy; f = cv2.FileStorage('{file}', cv2.FILE_STORAGE_READ); numpy.savetxt('{}', [f.getNode('{name}'{digits}).mat().ravel() for i in {numbers}], delimiter=',')`, and so for each array that is needed",
+            table_of(path)
+        ));
+    }
+    let is_comment =
+        |line: &&str| line.trim().is_empty() || line.trim_start().starts_with(['#', '%']) || line.starts_with("---");
     let lines: Vec<&str> = text.lines().filter(|line| !is_comment(line)).collect();
     let item = |line: &str| line.trim_start().strip_prefix("- ").is_some_and(|rest| !rest.contains([',', '[']));
     let of_yaml = lines.iter().filter(|line| behind_key(line).is_some() || item(line)).count();
@@ -96,21 +112,88 @@ pub(super) fn of_yaml(text: &str, path: &Utf8Path) -> Option<String> {
     if !nested || 10 * of_yaml < 9 * lines.len() {
         return None;
     }
-    let loaded = format!("yaml.safe_load(open('{}'))", path.file_name().unwrap_or_default());
-    let outer = |line: &str| !line.starts_with([' ', '\t', '-']);
-    let list = lines.windows(2).find(|two| outer(two[0]) && two[1].trim_start().starts_with("- "));
-    let name = |line: &str| line.trim_end().trim_end_matches(':').trim_matches(['\'', '"']).to_owned();
-    let records = match (lines.first().is_some_and(|first| first.starts_with('-')), list) {
+    let loaded = format!("yaml.safe_load(open('{file}'))");
+    let records = match (lines.first().is_some_and(|first| first.starts_with('-')), keys_to_list(&lines)) {
         (true, _) => loaded,
-        (_, Some(two)) => format!("{loaded}['{}']", name(two[0])),
+        (_, Some(keys)) => format!("{loaded}['{}']", keys.join("']['")),
         _ => format!("list({loaded}.values())"),
     };
-    Some(in_python("yaml", &format!("json_normalize({records})")))
+    Some(in_python("yaml", &format!("json_normalize({records})"), path))
+}
+
+/// The keys that lead to the first list of records.
+fn keys_to_list(lines: &[&str]) -> Option<Vec<String>> {
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    let is_record = |line: &&str| line.trim_start().starts_with("- ") && behind_key(line).is_some();
+    let list = lines.iter().position(is_record)?;
+    let mut keys: Vec<(usize, String)> = Vec::new();
+    for line in &lines[..list] {
+        keys.retain(|(before, _)| *before < indent(line));
+        let name = line.trim().split(':').next().unwrap_or_default().trim_matches(['\'', '"']);
+        keys.push((indent(line), name.to_owned()));
+    }
+    // The key of a list may stand as far to the right as its items, and no further.
+    keys.retain(|(before, _)| *before <= indent(lines[list]));
+    (!keys.is_empty()).then(|| keys.into_iter().map(|(_, key)| key).collect())
+}
+
+/// The name of the first matrix that OpenCV wrote, with `%d` for its number where there are several of it, and how many.
+fn opencv_matrices(text: &str) -> Option<(String, usize)> {
+    let name = |line: &str| Some(line.strip_suffix("!!opencv-matrix")?.trim().strip_suffix(':')?.to_owned());
+    let names: Vec<String> = text.lines().filter_map(|line| name(line.trim_end())).collect();
+    let first = names.first()?;
+    let base = first.trim_end_matches(|c: char| c.is_ascii_digit());
+    let is_one = |name: &&String| {
+        name.strip_prefix(base).is_some_and(|number| !number.is_empty() && number.chars().all(|c| c.is_ascii_digit()))
+    };
+    match names.iter().filter(is_one).count() {
+        count @ 2.. => Some((format!("{base}%d"), count)),
+        _ => Some((first.clone(), 1)),
+    }
 }
 
 /// What stands behind a key of YAML.
 fn behind_key(line: &str) -> Option<&str> {
     let (key, rest) = line.trim_start().trim_start_matches("- ").split_once(':')?;
-    let plain = |c: char| c.is_alphanumeric() || "_-./'\"".contains(c);
+    let plain = |c: char| c.is_alphanumeric() || "_-./*'\"".contains(c);
     (!key.is_empty() && key.chars().all(plain) && (rest.is_empty() || rest.starts_with(' '))).then_some(rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn yaml_is_told_with_the_line_that_exports_it() {
+        let pose = |k: usize| {
+            format!(
+                "      - name: p_{k}\n        joints: [0.1, {k}, -0.3]\n        speed: 0.2\n        # deg: 5.7 2 3\n"
+            )
+        };
+        let nested = format!("# poses\n/**:\n  parameters:\n    poses:\n{}{}{}", pose(1), pose(2), pose(3));
+        let said = of_yaml(&nested, Utf8Path::new("in/poses.yaml")).unwrap();
+        assert!(said.contains("['/**']['parameters']['poses']).to_csv('poses.csv'"), "{said}");
+        let records = "a:\n  q:\n  - 1\n  - 2\nb:\n  q:\n  - 3\n  - 4\n";
+        assert!(
+            of_yaml(records, Utf8Path::new("a.yml")).unwrap().contains("list(yaml.safe_load(open('a.yml')).values())")
+        );
+        let flat = "poses:\n- a: 1\n  b: 2\n- a: 3\n  b: 4\n";
+        assert!(of_yaml(flat, Utf8Path::new("a.yml")).unwrap().contains("open('a.yml'))['poses'])"));
+        let matrix = |k: usize| {
+            format!(
+                "T_{k}: !!opencv-matrix\n   rows: 2\n   cols: 2\n   dt: d\n   data: [ 1.5, 2.5,\n       3.5, 4.5 ]\n"
+            )
+        };
+        let opencv = format!("%YAML:1.0\n---\ncount: 2\n{}{}", matrix(0), matrix(1));
+        let said = of_yaml(&opencv, Utf8Path::new("pairs.yml")).unwrap();
+        assert!(said.contains("getNode('T_%d' % i)") && said.contains("range(2)"), "{said}");
+        assert_eq!(of_yaml("a,b,c\n1,2,3\n4,5,6\n", Utf8Path::new("a.csv")), None);
+        assert_eq!(of_yaml("- [1, 2, 3]\n- [4, 5, 6]\n", Utf8Path::new("a.yaml")), None);
+    }
+
+    #[test]
+    fn each_file_has_a_table_of_its_own() {
+        let of = |name: &str| of_bytes(b"[{\"a\": 1}, {\"a\": 2}]", Utf8Path::new(name)).unwrap().1;
+        assert!(of("in/one.json").contains("to_csv('one.csv'") && of("two.json").contains("to_csv('two.csv'"));
+    }
 }

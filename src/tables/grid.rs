@@ -202,11 +202,25 @@ fn without_brackets(text: &str) -> Option<String> {
             ';' if lists && line.contains(',') => ',',
             _ => c,
         };
+        // `[1, 2][3, 4]`: between two lists there is a cell's end as well.
+        let line = if line.contains(',') { parted(line) } else { line.to_owned() };
         let bare: String = line.chars().map(plain).collect();
         let bare = bare.trim().trim_end_matches([',', ';']).trim_end();
         bare.strip_prefix("- ").unwrap_or(bare).trim_start().to_owned()
     };
     Some(text.lines().map(|line| bare(line) + "\n").collect())
+}
+
+/// A line with a comma where one list begins right behind another.
+fn parted(line: &str) -> String {
+    let mut parted = String::with_capacity(line.len());
+    for c in line.chars() {
+        if matches!(c, '[' | '{' | '(') && parted.trim_end().ends_with([']', '}', ')']) {
+            parted.push(',');
+        }
+        parted.push(c);
+    }
+    parted
 }
 
 /// Whether a spreadsheet would compute this cell (OWASP, "CSV Injection"). A number, of either sign, is no formula.
@@ -295,6 +309,19 @@ mod tests {
             assert_eq!(delimiter, expected, "{text:?}");
             let cells: Vec<(u64, [&str; 2])> = rows.iter().map(|(l, r)| (*l, [r[0].as_str(), r[1].as_str()])).collect();
             assert_eq!(cells, [(1, ["j1", "x"]), (2, ["1.5", "-2"]), (4, ["3", "4e1"])], "{text:?}");
+        }
+    }
+
+    #[test]
+    fn lists_one_behind_the_other_are_apart() {
+        for between in ["][", "] [", "],["] {
+            let row = |k: usize| format!("[{k}.5,2,3{between}0.25,-0.5,0.5,0.75]\n");
+            let (delimiter, rows) = grid(&(1..5).map(row).collect::<String>());
+            assert_eq!(
+                (delimiter, rows[0].1.iter().map(|c| c.trim()).collect::<Vec<_>>()),
+                (',', vec!["1.5", "2", "3", "0.25", "-0.5", "0.5", "0.75"]),
+                "{between}"
+            );
         }
     }
 

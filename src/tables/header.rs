@@ -26,7 +26,12 @@ const COUNTED: usize = 4;
 
 /// Finds the names of a grid.
 pub fn split(grid: &Grid) -> Result<Headed> {
-    let first = grid.rows.iter().position(|(_, row)| is_data(row));
+    split_by(grid, &is_number)
+}
+
+/// The same of a grid whose numbers are written in another way as well.
+pub fn split_by(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
+    let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number));
     let Some(mut first) = first else {
         let records = grid.rows.iter().flat_map(|(_, row)| row.iter()).any(|cell| cell.starts_with("[{"));
         let hint = match records {
@@ -48,7 +53,7 @@ pub fn split(grid: &Grid) -> Result<Headed> {
         first = 1;
     } else {
         // Names may be numbers, too: the joints' 1 to 6 beside x, y and z.
-        first += usize::from(names_below(grid, first));
+        first += usize::from(names_below(grid, first, is_number));
         let width = grid.rows[first].1.len();
         let head = (0..first).rev().find(|&at| !is_remark(&grid.rows[at].1, width));
         // What stands above a remark may be a title as well.
@@ -64,24 +69,33 @@ pub fn split(grid: &Grid) -> Result<Headed> {
 
 /// The rows of a grid whose columns are named otherwise, whatever stands above them.
 pub fn rows_alone(grid: &Grid) -> Result<Headed> {
-    let first = grid.rows.iter().position(|(_, row)| is_data(row)).unwrap_or(0);
+    rows_alone_by(grid, &is_number)
+}
+
+/// The same of a grid whose numbers are written in another way as well.
+pub fn rows_alone_by(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
+    let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number)).unwrap_or(0);
     Ok(Headed { names: None, rows: even(grid, first, 0)? })
 }
 
+pub fn is_number(cell: &str) -> bool {
+    cell.parse::<f64>().is_ok()
+}
+
 /// More numbers than words.
-fn is_data(row: &Fields) -> bool {
+fn is_data(row: &Fields, is_number: &dyn Fn(&str) -> bool) -> bool {
     let filled = row.iter().filter(|cell| !cell.trim().is_empty()).count();
-    let numbers = row.iter().filter(|cell| cell.parse::<f64>().is_ok()).count();
+    let numbers = row.iter().filter(|cell| is_number(cell)).count();
     numbers > 0 && 2 * numbers >= filled
 }
 
 /// Whether a row counts some of its columns, and has words for others that have numbers in all rows below it.
-fn names_below(grid: &Grid, row: usize) -> bool {
+fn names_below(grid: &Grid, row: usize, is_number: &dyn Fn(&str) -> bool) -> bool {
     let (cells, below) = (&grid.rows[row].1, &grid.rows[row + 1..]);
     let counted: Vec<usize> = cells.iter().filter_map(|cell| cell.parse().ok()).collect();
     let counts = counted.first().is_some_and(|&first| first < 2 && counted.iter().zip(first..).all(|(n, i)| *n == i));
-    let is_word = |cell: &str| !cell.is_empty() && cell.parse::<f64>().is_err();
-    let numbers = |column: usize| below.iter().all(|(_, r)| column < r.len() && r[column].parse::<f64>().is_ok());
+    let is_word = |cell: &str| !cell.is_empty() && !is_number(cell);
+    let numbers = |column: usize| below.iter().all(|(_, r)| column < r.len() && is_number(&r[column]));
     counts && below.len() > 1 && (0..cells.len()).any(|column| is_word(&cells[column]) && numbers(column))
 }
 

@@ -287,7 +287,13 @@ fn matrix(words: &[String]) -> Option<(What, Vec<String>)> {
 }
 
 fn distance(words: &[String]) -> Option<(What, Vec<String>)> {
-    let at = words.iter().position(|w| matches!(w.as_str(), "l" | "distance" | "dist" | "length" | "len"))?;
+    // `dist_coeffs`: `dist` is a lens's distortion there.
+    let of_lens = |w: &String| {
+        matches!(w.as_str(), "coef" | "coefs" | "coeff" | "coeffs" | "coefficient" | "coefficients" | "distortion")
+    };
+    let is_lens = words.iter().any(of_lens);
+    let is_it = |w: &String| matches!(w.as_str(), "l" | "distance" | "dist" | "length" | "len");
+    let at = words.iter().position(is_it).filter(|_| !is_lens)?;
     Some((What::Distance, without(words, &[at])))
 }
 
@@ -374,6 +380,7 @@ mod tests {
         assert_eq!(what("m_03").0, What::Matrix(0, 3));
         assert_eq!(what("T14").0, What::Matrix(1, 4));
         assert_eq!(what("L").0, What::Distance);
+        assert_eq!(what("dist_coeffs_1").0, What::Other);
         assert_eq!(what("distance_mm"), (What::Distance, Some(Unit::Mm), None));
         assert_eq!(what("pose").0, What::Own("pose"));
     }

@@ -1,12 +1,14 @@
-//! Targets that are hardly what was meant: corrected already, or in another unit.
+//! Targets that are hardly what was meant: corrected already, in another unit, or in a language that is not read.
 
 use camino::Utf8Path;
 
 use super::super::Result;
 use crate::compensate::Target;
 use crate::config;
+use crate::files;
 use crate::files::provenance::{Digested, Provenance};
 use crate::formats::targets::Row;
+use crate::programs::{Language, unread};
 use crate::progress;
 use crate::robot::{Robot, file};
 
@@ -23,6 +25,33 @@ pub(super) fn refuse_corrected(targets: &Utf8Path) -> Result<()> {
         hint: format!("give the targets as they were written for the nominal robot; that run was `{}`", run.command),
     }
     .into())
+}
+
+/// Refuses programs that are none of those that are read, which are no tables either.
+pub(super) fn refuse_unread(targets: &Utf8Path) -> Result<()> {
+    if Language::of(targets).is_some() {
+        return Ok(());
+    }
+    let Ok(bytes) = std::fs::read(targets) else { return Ok(()) };
+    let text = String::from_utf8_lossy(&bytes);
+    let refuse = |message: String, hint: &str| Err(files::Error::format(targets, None, message, Some(hint)).into());
+    if let Some(name) = unread(targets, &text) {
+        let read: Vec<&str> = Language::ALL.into_iter().map(Language::name).collect();
+        let message = format!("a program in a language that is not read ({name})");
+        let hint = format!(
+            "programs in {} are read; else give the targets as a CSV of name,j1_deg,...,jN_deg",
+            read.join(", ")
+        );
+        return refuse(message, &hint);
+    }
+    match Language::seen_in(&text) {
+        Some((language, ending)) => {
+            let name = targets.file_stem().unwrap_or("program");
+            let hint = format!("call the file {name}.{ending}: the ending says the language");
+            refuse(format!("this looks like a program in {}", language.name()), &hint)
+        }
+        None => Ok(()),
+    }
 }
 
 /// That both robots are ones that `identify` found, and the second was not found from the first.
@@ -63,5 +92,36 @@ pub(super) fn warn(rows: &[Row], robot: &Robot) {
              the real arm can",
             open.join(", ")
         ));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_that_are_not_read_are_named() {
+        let said = |name: &str, text: &str| {
+            let (_folder, path) = files::temporary(name, text);
+            refuse_unread(&path).err().map_or(String::new(), |e| crate::diagnostic::report(&e))
+        };
+        let doosan = "from DRCF import *\nv = 60\ndef go():\n    movej(posj(0, 10, -80, 0, 70, 20), v=30, a=60)\n";
+        let kawasaki = ".PROGRAM go()\n  SPEED 50 ALWAYS\n  JMOVE #[0,20,0,0,0,40]\n.END\n";
+        for (name, text, word) in [
+            ("a.drl", doosan, "Doosan DRL"),
+            ("a.py", doosan, "Doosan DRL"),
+            ("a.as", kawasaki, "Kawasaki AS"),
+            ("a.txt", kawasaki, "Kawasaki AS"),
+            ("a.as", ".AUXDATA\nN_INT1 \"a  \"\n.END\n", "Kawasaki AS"),
+            ("a.py", "movej([0, 1, 2])\n", "Python"),
+        ] {
+            let said = said(name, text);
+            assert!(said.contains(word) && said.contains("URScript, ABB RAPID, KUKA KRL"), "{name}: {said}");
+        }
+        let ur = "def calibration():\n  set_tcp(p[0,0,0,0,0,0])\n  movej([0.1,-1.2,1.3,0,1.5,0], a=1, v=1)\nend\n";
+        assert!(said("poses.txt", ur).contains("call the file poses.script"), "{}", said("poses.txt", ur));
+        for (name, text) in [("a.script", ur), ("a.csv", "name,j1_deg\na,1\n"), ("a.txt", "1 2 3\n4 5 6\n")] {
+            assert_eq!(said(name, text), "", "{name}");
+        }
     }
 }

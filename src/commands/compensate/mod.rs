@@ -23,6 +23,7 @@ use told::{Summary, said};
 /// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     doubts::refuse_corrected(&args.targets)?;
+    doubts::refuse_unread(&args.targets)?;
     let pair = Pair::read(args)?;
     doubts::of_nominal(&args.robot, &args.identified).iter().for_each(progress::warn);
     let nominal = &pair.nominal;

@@ -7,8 +7,10 @@
 //! does not name are zero. Names that the text sets to a number stand for it.
 //! What goes wrong: a parameter that is no number, links of several robots, sliding joints that no call of a toolbox makes; all refused with the line.
 
+mod added;
 mod calls;
 mod comments;
+mod ends;
 mod link;
 mod lists;
 mod matrix;
@@ -18,6 +20,7 @@ mod scan;
 #[cfg(test)]
 mod tests;
 
+pub use self::ends::End;
 pub use self::matrix::{Matrix, matrix};
 
 use self::link::Link;
@@ -28,7 +31,7 @@ use crate::robot::catalogue::Convention;
 use crate::tables::expression::Value;
 
 /// Why a sliding joint is refused that no call of a toolbox makes.
-const SLIDES: &str = "a joint slides here, which only the calls of a toolbox (`Prismatic`) and a table's column `type` say of its row: write a table, a row a joint";
+const SLIDES: &str = "a joint slides here, which only the calls of a toolbox (`Prismatic`), `type: prismatic` beside a link's parameters and a table's column `type` say of its row: write a table, a row a joint";
 
 /// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,11 +61,16 @@ pub struct Links {
     pub limits: Vec<Option<[Value; 2]>>,
     /// Whether the text speaks of limits, read or not.
     pub limited: bool,
+    /// The base and the tool that a toolbox is told.
+    pub ends: [Option<End>; 2],
+    /// What was taken of them, and what was not.
+    pub ends_said: String,
 }
 
 /// Reads a text; `prose` says that it is one of sentences, without code.
 pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     let (code, comments) = comments::split(text);
+    let code = comments::without_demonstration(&code);
     let words = if prose { Words::of(text, "") } else { Words::of(&comments, &code) };
     let mut scan = Scan { text: &code, line: 1, ..Scan::default() };
     scan.run()?;
@@ -71,9 +79,14 @@ pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     if let Some(at) = says.filter(|_| scan.links.len() > 1 && !scan.links.iter().any(|link| link.slides)) {
         return Err((1 + lower[..at].matches('\n').count() as u64, SLIDES.to_owned()));
     }
+    added::none(&code, &scan.links)?;
     robots::of_one(&code, &scan.links.iter().map(|link| link.line).collect::<Vec<_>>())?;
     let known = std::mem::take(&mut scan.known);
-    Ok(Text { links: links(scan, lower.contains("qlim"))?, words, known })
+    let mut links = links(scan, lower.contains("qlim"))?;
+    if let Some(links) = links.as_mut().filter(|links| links.calls) {
+        (links.ends, links.ends_said) = ends::of(&code, &known);
+    }
+    Ok(Text { links, words, known })
 }
 
 /// The links of what was read; none where there are fewer than two.
@@ -121,5 +134,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
         calls: links.iter().any(|link| link.call),
         limits: links.iter().map(|link| link.limits).collect(),
         limited,
+        ends: [None; 2],
+        ends_said: String::new(),
     }))
 }

@@ -62,6 +62,15 @@ impl Words {
     }
 }
 
+/// Whether a joint slides, in the words of tables; sigma of the Robotics Toolbox is 1 where it does.
+pub fn slides(word: &str) -> Option<bool> {
+    match word.trim().trim_matches(['"', '\'']).to_lowercase().as_str() {
+        "revolute" | "rotary" | "rotational" | "rot" | "r" | "0" => Some(false),
+        "prismatic" | "linear" | "sliding" | "translational" | "p" | "1" => Some(true),
+        _ => None,
+    }
+}
+
 /// The units that a line in small letters says something to be in.
 fn stated(line: &str) -> Vec<Unit> {
     let mut found = Vec::new();

@@ -4,6 +4,7 @@ use super::names::plain;
 use super::table::Table;
 use super::units::TWO_TURNS;
 use crate::files::Result;
+use crate::formats::robots::dh_words::slides;
 use crate::tables::Fields;
 use crate::tables::names::{self, Unit};
 
@@ -39,15 +40,6 @@ fn is_of_kind(name: &str) -> bool {
     matches!(&words.iter().map(String::as_str).collect::<Vec<_>>()[..], ["type" | "kind" | "sigma" | "jointtype"])
 }
 
-/// Whether a joint slides, in the words of tables; sigma of the Robotics Toolbox is 1 where it does.
-fn slides(cell: &str) -> Option<bool> {
-    match cell.trim().trim_matches(['"', '\'']).to_lowercase().as_str() {
-        "revolute" | "rotary" | "rotational" | "rot" | "r" | "0" => Some(false),
-        "prismatic" | "linear" | "sliding" | "translational" | "p" | "1" => Some(true),
-        _ => None,
-    }
-}
-
 /// Whether a column is that of a limit: -1 the least, 1 the largest angle.
 fn side(name: &str) -> Option<i32> {
     const BESIDE: &str = "q theta \u{3b8} joint angle limit limits lim range position pos deg rad degree degrees j i";
@@ -69,13 +61,10 @@ impl Table<'_> {
     /// Columns beside the parameters, of a table with names.
     pub(super) fn beside(&self, columns: [usize; 4]) -> Result<Beside> {
         let names = self.names.unwrap_or_default();
-        let only = |wanted: &dyn Fn(&str) -> bool| {
-            let mut found = (0..names.len()).filter(|&c| wanted(&names[c]));
-            found.next().filter(|_| found.next().is_none())
-        };
+        let only = |wanted: &dyn Fn(&str) -> bool| self.only(wanted);
         let beta = only(&|name| name.eq_ignore_ascii_case("beta_deg"));
         let bounds = only(&|name| side(name) == Some(-1)).zip(only(&|name| side(name) == Some(1)));
-        let kind = only(&|name| is_of_kind(name));
+        let kind = self.kind();
         let slides = self.sliding(kind)?;
         let (mut beta_deg, mut limits_deg) = (Vec::new(), Vec::new());
         for (line, row) in self.rows {
@@ -107,8 +96,20 @@ impl Table<'_> {
         Ok(Beside { beta_deg, limits_deg, slides, left_out })
     }
 
+    /// The one column whose name is so.
+    fn only(&self, wanted: &dyn Fn(&str) -> bool) -> Option<usize> {
+        let names = self.names.unwrap_or_default();
+        let mut found = (0..names.len()).filter(|&c| wanted(&names[c]));
+        found.next().filter(|_| found.next().is_none())
+    }
+
+    /// The column that says whether a joint turns or slides.
+    pub(super) fn kind(&self) -> Option<usize> {
+        self.only(&is_of_kind)
+    }
+
     /// Which rows are of joints that slide. A column of other words, of motors for one, says nothing of it.
-    fn sliding(&self, kind: Option<usize>) -> Result<Vec<bool>> {
+    pub(super) fn sliding(&self, kind: Option<usize>) -> Result<Vec<bool>> {
         let of_row = |(_, row): &(u64, Fields)| kind.and_then(|column| slides(&row[column]));
         let said: Vec<Option<bool>> = self.rows.iter().map(of_row).collect();
         let unknown = said.iter().position(Option::is_none).filter(|_| said.iter().any(Option::is_some));

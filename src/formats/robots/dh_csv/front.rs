@@ -170,7 +170,10 @@ fn without_names(table: &Table) -> Result<Vec<Reading>> {
 /// The rows of a file; `words` are of all its text, where that is known.
 fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Reading>> {
     let given = given(asked);
-    let Headed { names, rows } = if given.is_some() { header::rows_alone(grid)? } else { header::split(grid)? };
+    let Headed { names, rows } = match given {
+        Some(_) => header::rows_alone_by(grid, &is_number)?,
+        None => header::split_by(grid, &is_number)?,
+    };
     let width = rows.first().map_or(0, |(_, row)| row.len());
     if let Some(given) = given.as_ref().filter(|given| given.len() != width) {
         let line = rows.first().map_or(1, |(line, _)| *line);
@@ -180,19 +183,13 @@ fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Readi
     let prose = || grid.rows.iter().map(|(_, row)| row.iter().collect::<Vec<_>>().join(" ") + "\n").collect::<String>();
     let words = words.unwrap_or_else(|| Words::of(&prose(), ""));
     let names = given.clone().or(names);
-    let rows = [above(grid, given.as_deref(), &rows)?, rows].concat();
     ways(&Table { names: names.as_deref(), ..table(grid, &rows, asked, words, given.as_deref()) })
 }
 
-/// Rows before those with most cells numbers, where a flag names the columns: `q1, 0, pi/2, 0` is one, and names of columns are none.
-fn above(grid: &Grid, given: Option<&[String]>, rows: &[(u64, Fields)]) -> Result<Vec<(u64, Fields)>> {
-    let (Some(given), Some((first, below))) = (given, rows.first()) else { return Ok(Vec::new()) };
-    let columns = named(grid, given)?;
-    let is_row = |row: &Fields| {
-        row.len() == below.len() && columns.iter().all(|&c| expression::evaluate(&row[c], &|_| None).is_some())
-    };
-    let before = grid.rows.iter().take_while(|(line, _)| line < first);
-    Ok(before.filter(|(_, row)| is_row(row)).cloned().collect())
+/// Whether a cell is a number or a formula; a name alone, `theta`, is of a column.
+fn is_number(cell: &str) -> bool {
+    header::is_number(cell)
+        || cell.contains(|c: char| c.is_ascii_digit() || c == '/') && expression::evaluate(cell, &|_| None).is_some()
 }
 
 /// Links whose parameters a text names.
@@ -230,6 +227,8 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     if !flipped.is_empty() {
         found.said += &format!(", counted the other way (flip): {}", flipped.join(", "));
     }
+    found.ends = links.ends.map(|end| end.map(|end| end.in_mm(found.length_mm)));
+    found.said += &links.ends_said;
     if links.limited && found.limits_deg.iter().any(Option::is_none) {
         found.said.push_str(", left out: qlim");
     }

@@ -32,6 +32,10 @@ pub struct Reading {
     pub(super) slides: Vec<bool>,
     /// Of joints that count the other way, where the table says it.
     pub(super) flipped: Vec<bool>,
+    /// What a toolbox puts before the first joint's frame, its base, and behind the last one's, its tool, mm.
+    pub(super) ends: [Option<Transform>; 2],
+    /// What the table's unit of lengths is in mm.
+    pub(super) length_mm: f64,
     /// What was taken, for a sentence.
     pub said: String,
     /// The columns' names in their order, as `--columns` has them.
@@ -65,10 +69,12 @@ impl Reading {
         if !self.flange.is_empty() {
             let held = from_rows(name, convention, &self.flange);
             let still = vec![0.0; self.flange.len()];
-            let flange: Transform = robot.ends.last_frame_from_flange * held.root_from_flange(&still);
-            robot.ends.last_frame_from_flange = flange;
-            robot.tool_mm = flange.translation.vector;
+            robot.ends.last_frame_from_flange *= held.root_from_flange(&still);
         }
+        let [base, tool] = self.ends.map(Option::unwrap_or_default);
+        robot.ends.root_from_frame0 = base * robot.ends.root_from_frame0;
+        robot.ends.last_frame_from_flange *= tool;
+        robot.tool_mm = robot.ends.last_frame_from_flange.translation.vector;
         robot
     }
 
@@ -173,7 +179,7 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     }
     let (words, open) = (table.words, angles_open.or(lengths_open));
     let found = Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, ..Reading::default() };
-    Ok(Reading { stated, words, own, open, ..found })
+    Ok(Reading { stated, words, own, open, length_mm: d.converted(1.0), ..found })
 }
 
 /// What `a(i-1)`, `alpha_{i-1}` say.

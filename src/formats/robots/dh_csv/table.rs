@@ -44,17 +44,22 @@ impl Table<'_> {
         let theta = columns[2];
         let turns = |row: &(u64, Fields)| self.value(&row.1[theta]).is_some_and(|v| v.variable);
         // What is no number, or slides, is said of the cell.
-        let stands = |row: &&(u64, Fields)| columns.iter().all(|&c| self.value(&row.1[c]).is_some_and(|v| !v.variable));
-        let Some(last) = self.rows.iter().rposition(turns) else { return Ok(self.rows.len()) };
-        match self.rows[..last].iter().find(stands) {
-            Some((line, row)) => {
+        let slides = self.sliding(self.kind())?;
+        let stands = |(row, slides): &(&(u64, Fields), &bool)| {
+            !**slides && columns.iter().all(|&c| self.value(&row.1[c]).is_some_and(|v| !v.variable))
+        };
+        let moves = |at: &usize| turns(&self.rows[*at]) || slides[*at];
+        let last = (0..self.rows.len()).rev().find(moves).filter(|_| self.rows.iter().any(turns));
+        let Some(last) = last else { return Ok(self.rows.len()) };
+        match self.rows[..last].iter().zip(&slides).find(stands) {
+            Some(((line, row), _)) => {
                 let message = format!(
                     "theta is `{}`, but other rows have their joint's variable there: this one does not turn",
                     &row[theta]
                 );
                 Err(self.grid.refuse(*line, message, Some("a row a joint; add what stands still to the row before")))
             }
-            None if self.rows[last + 1..].iter().all(|row| stands(&row)) => Ok(last + 1),
+            None if self.rows.iter().zip(&slides).skip(last + 1).all(|row| stands(&row)) => Ok(last + 1),
             None => Ok(self.rows.len()),
         }
     }
@@ -63,11 +68,12 @@ impl Table<'_> {
     pub fn numbers(&self, columns: [usize; 4]) -> Result<(Vec<Row>, bool)> {
         let mut numbers: Vec<Row> = Vec::with_capacity(self.rows.len());
         let mut radians = false;
-        for (line, row) in self.rows {
+        let slides = self.sliding(self.kind())?;
+        for ((line, row), slides) in self.rows.iter().zip(slides) {
             let mut of_row = [0.0; 4];
             for (which, (slot, &column)) in of_row.iter_mut().zip(&columns).enumerate() {
                 let value = self.number(*line, row, column)?;
-                if value.variable && which != 2 {
+                if value.variable && which != 2 && !(slides && which == 3) {
                     let message =
                         format!("`{}`: the joint's variable is {}, so the joint slides", &row[column], NAMES[which]);
                     let hint =

@@ -68,6 +68,29 @@ fn the_ends_of_a_table_show_its_convention_where_no_word_says_it() {
 }
 
 #[test]
+fn formulas_in_the_first_rows_are_no_names_and_a_column_says_what_slides() {
+    let rows = |kind: [&str; 2], d: &str| {
+        let (r, p) = (kind[0], kind[1]);
+        format!("pi/2,0,0,q1+pi/2,{r}\n-pi/2,0,0,q2 - pi/2,{r}\npi/2,0,{d},0,{p}\n-pi/2,0.02,0.3,q4,{r}\n")
+    };
+    for (kind, name) in [(["R", "P"], "type"), (["revolute", "prismatic"], "joint_type"), (["0", "1"], "sigma")] {
+        for d in ["-0.25", "q3 - 0.25", "q3-0.25"] {
+            let found = one("dh.csv", &format!("alpha,a,d,theta,{name}\n{}", rows(kind, d)));
+            assert_eq!(found.slides, [false, false, true, false], "{name} {d}");
+            let [alpha, a, theta, d_mm] = found.rows[2];
+            assert!((alpha - 90.0).abs() < 1e-9 && (a, theta, d_mm) == (0.0, 0.0, -250.0), "{:?}", found.rows);
+        }
+    }
+    // A sliding joint at the end is one, and what stands still behind it is the flange.
+    let last = "alpha,a,d,theta,type\n0,0.3,0.4,q1,R\npi,0.2,0,q2,R\n0,0,q3,0,P\n";
+    assert_eq!((one("dh.csv", last).rows.len(), one("dh.csv", last).slides[2]), (3, true));
+    let without = said("dh.csv", &last.replace(",type", "").replace(",R", "").replace(",P", ""));
+    assert!(without.contains("the joint slides") && without.contains("dh.csv:4"), "{without}");
+    let still = said("dh.csv", &format!("alpha,a,d,theta,type\n{}", rows(["R", "R"], "-0.25")));
+    assert!(still.contains("does not turn"), "{still}");
+}
+
+#[test]
 fn without_names_every_order_that_could_be_is_offered() {
     let found = all("0, 0, 487, 0\n-90, 85, 0, -90\n0, 640, 12.5, 0\n").unwrap();
     assert!(found.len() > 1 && found.iter().any(|r| r.columns == "alpha,a,d,theta"), "{found:?}");

@@ -50,3 +50,16 @@ pub(super) fn split(text: &str) -> (String, String) {
     }
     (plain, comments)
 }
+
+/// The text without what Python runs of a file by itself alone, `if __name__ == "__main__":`, as empty lines: that shows how a robot is used.
+pub(super) fn without_demonstration(code: &str) -> String {
+    let mut shows = false;
+    let mut plain = String::with_capacity(code.len());
+    for line in code.lines() {
+        let stands_out = !line.starts_with([' ', '\t']) && !line.trim().is_empty();
+        shows = if stands_out { line.starts_with("if __name__") } else { shows };
+        plain.push_str(if shows { "" } else { line });
+        plain.push('\n');
+    }
+    plain
+}

@@ -35,6 +35,8 @@ pub(super) struct Link {
     /// The least and the largest reading.
     pub limits: Option<[Value; 2]>,
     pub slides: bool,
+    /// Whether a word beside its parameters said so or not, `type: prismatic`.
+    pub kind: bool,
     /// Whether the joint counts the other way.
     pub flipped: bool,
     /// The convention that its call says.
@@ -47,12 +49,17 @@ impl Link {
         Link { line, depth, ..Link::default() }
     }
 
+    /// What a word beside its parameters says.
+    pub fn kind(&mut self, slides: bool) {
+        (self.kind, self.slides) = (true, slides);
+    }
+
     /// Alpha, a, theta and d, zero where nothing says otherwise. What a call makes moves, whatever its theta says.
     pub fn row(&self) -> Result<[Value; 4], Wrong> {
         let none = Value { number: 0.0, radians: false, variable: false };
         let value = |v: Option<Value>| v.map_or(none, |v| Value { variable: v.variable && !self.call, ..v });
         let mut row = self.values.map(value);
-        if self.slides && row[3].number != 0.0 {
+        if self.slides && self.call && row[3].number != 0.0 {
             let message = format!(
                 "the joint slides, so that d is its reading, but d is {} beside it, which the toolbox leaves out: write it as `offset`, or leave it out",
                 row[3].number

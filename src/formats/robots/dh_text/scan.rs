@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use super::link::{CALLS, KEYS, Known, Link, Wrong};
 use super::lists::{self, Lists, extent, list};
 use super::numbered;
+use crate::formats::robots::dh_words::slides;
 use crate::tables::expression::{Value, evaluate};
 
 #[derive(Default)]
@@ -96,6 +97,9 @@ impl Scan<'_> {
             self.at = value_at + extent(value);
             return Ok(());
         }
+        if self.of_kind(word, value) {
+            return Ok(());
+        }
         let which = KEYS.iter().position(|names| names.contains(&word.to_lowercase().as_str()));
         if let Some(which) = which {
             if let Some(list) = list(value, &self.known) {
@@ -111,13 +115,7 @@ impl Scan<'_> {
                 Some(_) if self.depth > 0 => {
                     return Err((self.line, format!("`{}`: a joint that slides", text.trim())));
                 }
-                None if self.depth > 0 && !text.trim().is_empty() => {
-                    let wrong = format!(
-                        "`{word}` is `{}`, which is no number: names that the file sets to numbers above, + - * /, sin, cos, tan and sqrt are followed",
-                        text.trim()
-                    );
-                    self.wrong.get_or_insert((self.line, wrong));
-                }
+                None if self.depth > 0 && !text.trim().is_empty() => self.no_number(word, text.trim()),
                 _ => {}
             }
         } else if let Some((which, number)) = numbered::parameter(word)
@@ -130,6 +128,20 @@ impl Scan<'_> {
             self.assign(start, word.to_owned(), value);
         }
         Ok(())
+    }
+
+    /// Keeps the first value that is no number.
+    fn no_number(&mut self, word: &str, text: &str) {
+        let wrong = format!(
+            "`{word}` is `{text}`, which is no number: names that the file sets to numbers above, + - * /, sin, cos, tan and sqrt are followed"
+        );
+        self.wrong.get_or_insert((self.line, wrong));
+    }
+
+    /// A word beside a link's parameters that says whether it slides; whether it is one.
+    fn of_kind(&mut self, word: &str, value: &str) -> bool {
+        let said = slides(&value[..extent(value)]).filter(|_| matches!(word, "type" | "joint_type"));
+        said.inspect(|slides| self.open(|link| !link.kind).kind(*slides)).is_some()
     }
 
     /// What else a name with a value may be: a list of a family, a link's limits.
@@ -163,16 +175,17 @@ impl Scan<'_> {
     }
 
     fn put(&mut self, which: usize, value: Value) {
-        let (depth, line) = (self.depth, self.line);
-        let open = self.links.last_mut().filter(|link| link.depth == depth && link.values[which].is_none());
-        match open {
-            Some(link) => link.values[which] = Some(value),
-            None => {
-                let mut link = Link::at(line, depth);
-                link.values[which] = Some(value);
-                self.links.push(link);
-            }
+        self.open(|link| link.values[which].is_none()).values[which] = Some(value);
+    }
+
+    /// The link that is being read where it has room, else a new one.
+    fn open(&mut self, room: impl Fn(&Link) -> bool) -> &mut Link {
+        let is_open = self.links.last().is_some_and(|link| link.depth == self.depth && room(link));
+        if !is_open {
+            self.links.push(Link::at(self.line, self.depth));
         }
+        let last = self.links.len() - 1;
+        &mut self.links[last]
     }
 }
 

@@ -79,7 +79,7 @@ fn a_table_in_brackets_has_its_order_in_a_comment() {
 fn what_a_table_has_no_place_for_is_refused_with_its_line() {
     let wrong = |text: &str| read(text, false).unwrap_err();
     let two = "RevoluteDH(d=0.3, alpha=pi/2)\n";
-    let slides = "x: {a: 0, d: 1, alpha: 2, type: 'prismatic'}\ny: {a: 0, d: 1, alpha: 2}\n";
+    let slides = "x: {a: 0, d: 1, alpha: 2, moves: 'prismatic'}\ny: {a: 0, d: 1, alpha: 2}\n";
     assert!(wrong(&format!("\n{slides}")) == (2, SLIDES.to_owned()));
     assert!(wrong(&format!("{two}RevoluteDH(d=d2, a=0.2)\n")).1.contains("`d2`"));
     assert!(wrong(&format!("{two}RevoluteDH(d=f(1), a=0.2)\n")).1.contains("sqrt are followed"));
@@ -212,4 +212,78 @@ fn links_of_calls_slide_count_the_other_way_and_follow_formulas() {
     assert_eq!((python.slides, python.flipped), (vec![false, true, false], vec![true, false, false]));
     let vectors = links("L(1) = Link([0 0.4 0 -pi/2 0]);\nL(2) = Link([-pi/2 0 0 0 1]);\nL(3) = Link('sigma', 1);\n");
     assert_eq!((vectors.slides, vectors.flipped), (vec![false, true, true], vec![false; 3]));
+}
+
+#[test]
+fn a_word_beside_the_parameters_says_that_a_joint_slides() {
+    let block = "j1:\n  type: revolute\n  a: 0.1\n  alpha: 0\n  d: 0.3\n  theta: 0\nj2:\n  type: prismatic\n  a: 0.2\n  alpha: 3.14159\n  d: 0.05\n  theta: 0\n";
+    let last = "- a: 0.1\n  alpha: 0\n  d: 0.3\n  theta: 0\n  joint_type: R\n- a: 0.2\n  alpha: 0\n  d: 0.05\n  theta: 0\n  joint_type: P\n";
+    let flow = "{\"links\": [{\"type\": \"revolute\", \"a\": 0.1, \"alpha\": 0, \"d\": 0.3, \"theta\": 0},\n{\"a\": 0.2, \"alpha\": 0, \"d\": 0.05, \"theta\": 0, \"type\": \"prismatic\"}]}\n";
+    for text in [block, last, flow] {
+        let links = read(text, false).unwrap().links.unwrap();
+        assert_eq!(links.slides, [false, true], "{text}");
+        assert_eq!((links.rows.len(), links.rows[1].1[3].number), (2, 0.05), "{text}");
+    }
+}
+
+/// A model in the manner of a toolbox.
+const MODEL: &str = "class Arm(DHRobot):\n    def __init__(self, base=None):\n        links = [\n            RevoluteDH(d=0.4, a=0.3),\n            RevoluteDH(a=0.2, alpha=pi),\n            PrismaticDH(qlim=[0, 0.2]),\n        ]\n        super().__init__(links, name=\"Arm\")\n";
+
+#[test]
+fn what_shows_the_use_of_a_robot_is_no_link() {
+    let shown = format!(
+        "{MODEL}\n\nif __name__ == \"__main__\":  # no cover\n    a = RevoluteDH(d=0.4, a=0.3)\n\n    print(a)\n"
+    );
+    assert_eq!(rows(&shown).0.len(), 3);
+    assert_eq!(rows(&format!("{shown}x = 3\nl4 = RevoluteDH(a=0.1)\n")).0.len(), 4);
+}
+
+#[test]
+fn links_that_cannot_be_followed_are_refused_with_their_line() {
+    let before = "        super().__init__";
+    for (added, word) in [
+        ("links.extend(other.links)", "`links.extend(other.links)`"),
+        ("links += other.links", "`links += other.links`"),
+        ("links.append(other[0])", "`links.append(other[0])`"),
+    ] {
+        let (line, message) = read(&MODEL.replace(before, &format!("        {added}\n{before}")), false).unwrap_err();
+        assert!(line == 8 && message.contains(word), "{line} {message}");
+    }
+    let (line, message) = read(&MODEL.replace("(links,", "(links + other.links,"), false).unwrap_err();
+    assert!(line == 8 && message.contains("`links + other.links`"), "{message}");
+    // What the file makes itself may be added one by one.
+    let tail = "        links.append(RevoluteDH())\n        last = RevoluteDH(a=0.1)\n        links.append(last)\n";
+    assert_eq!(rows(&MODEL.replace(before, &format!("{tail}{before}"))).0.len(), 5);
+    let matlab =
+        "L1 = Link('d', 0.1, 'a', 0.2);\nL2 = Link('d', 0, 'a', 0.3);\nr = SerialLink([L1 L2], 'name', 'two');\n";
+    assert_eq!(rows(matlab).0.len(), 2);
+}
+
+#[test]
+fn base_and_tool_of_a_toolbox_are_taken_where_they_are_numbers() {
+    let of = |told: &str| {
+        let text = MODEL.replace("name=\"Arm\"", &format!("name=\"Arm\", {told}"));
+        let links = read(&text, false).unwrap().links.unwrap();
+        (links.ends.map(|end| end.map(|end| end.in_mm(1000.0))), links.ends_said)
+    };
+    let ([base, tool], said) = of("base=SE3.Ry(pi / 2), tool=transl(0, 0.1, 0.2) @ trotz(-90, 'deg')");
+    assert!((base.unwrap().rotation.angle() - PI / 2.0).abs() < 1e-12);
+    let tool = tool.unwrap();
+    assert_eq!(tool.translation.vector.as_slice(), [0.0, 100.0, 200.0]);
+    assert!((tool.rotation.scaled_axis().z + PI / 2.0).abs() < 1e-12);
+    assert_eq!(said, ", base of line 8, tool of line 8");
+    for nothing in ["manufacturer='x'", "base=base", "tool=None", "tool=SE3()"] {
+        assert_eq!(of(nothing), ([None; 2], String::new()), "{nothing}");
+    }
+    let (ends, said) = of("tool=grip(3)");
+    assert!(ends == [None; 2] && said.contains("LEFT OUT: the tool of line 8, `grip(3)`"), "{said}");
+    // Names, and what is told of the robot afterwards.
+    let ends = |code: &str| read(code, false).unwrap().links.unwrap().ends;
+    let named = MODEL
+        .replace("        super", "        h = 0.05\n        tool = SE3(0, 0, 2*h)\n        super")
+        .replace("name=", "tool=tool, name=");
+    assert_eq!(ends(&named)[1].map(|e| e.in_mm(1.0).translation.z), Some(0.1));
+    let matlab = "L(1) = Link('d', 0.1, 'a', 0.2);\nL(2) = Link('d', 0, 'a', 0.3);\nr = SerialLink(L, 'name', 'two', 'tool', transl(0, 0, 0.1));\nr.base = transl([0.5 0 0]);\n";
+    let found = ends(&matlab.replace("0.5 0 0", "0.5, 0, 0"));
+    assert_eq!(found.map(|e| e.map(|e| e.in_mm(1.0).translation.vector.sum())), [Some(0.5), Some(0.1)]);
 }

@@ -3,6 +3,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder, list};
+use super::matching::Matched;
 use super::names::{Open, Reach, stem};
 use super::readings::{Reading, Told};
 use super::{Halves, PairBy, Pairing, Source};
@@ -37,13 +38,9 @@ pub fn taken(reading: &Reading, top: &Utf8Path) -> String {
         Told::Given | Told::Words | Told::Letters => "",
         Told::Alike | Told::Two => "; no word tells left from right: the first by name is left",
     };
-    format!(
-        "{} by {}: left {}, right {}{unsaid}",
-        count(reading.count(), "pair"),
-        reading.matched.by.word(),
-        files(0),
-        files(1)
-    )
+    let Matched { by, also, .. } = &reading.matched;
+    let by = by.word().to_owned() + &also.map_or_else(String::new, |also| format!(" and {}", also.word()));
+    format!("{} by {}: left {}, right {}{unsaid}", count(reading.count(), "pair"), by, files(0), files(1))
 }
 
 /// Whether the left pictures are all called right ones, and the right pictures left ones.
@@ -186,8 +183,9 @@ fn unmatched(source: &Source<'_>, reading: &Reading) -> (String, String) {
             format!("{} and {right} right ones cannot be paired in their order", count(left, "left picture"));
         return (statement, "`--pair-by order` needs as many left pictures as right ones".to_owned());
     }
+    let by = source.by.map_or("name or number", PairBy::word);
     let statement = format!(
-        "no pair found: {} have no partner of the same name or number on the other side",
+        "no pair found: {} have no partner of the same {by} on the other side, or more than one",
         count(left + right, "picture")
     );
     let hint = if left == right {
@@ -249,7 +247,15 @@ fn untold(source: &Source<'_>, holding: &[&Folder], pictures: usize) -> (String,
         ),
         _ => (
             format!("no pair found: the names of {} tell neither left nor right", count(pictures, "picture")),
-            format!("{} takes a folder of each camera's pictures", by_hand(source)),
+            match halves {
+                Some(_) => format!("{} takes a folder of each camera's pictures", by_hand(source)),
+                None => format!(
+                    "{} takes a folder of each camera's pictures; where each picture holds both views, `{}` or `{}` cuts it in two",
+                    by_hand(source),
+                    Halves::SideBySide.flag(),
+                    Halves::TopBottom.flag()
+                ),
+            },
         ),
     };
     (statement, halves.map_or(hint.clone(), |halves| format!("{halves}; else {hint}")))
@@ -278,7 +284,7 @@ impl Pairing {
         }
         let Aside { other, again } = self.aside;
         if again > 0 {
-            parts.push(format!("{} in a lossy format beside others of the same names", count(again, "picture")));
+            parts.push(format!("{} in another format beside others of the same names", count(again, "picture")));
         }
         if other > 0 {
             parts.push(count(other, "other file"));

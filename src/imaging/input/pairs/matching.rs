@@ -1,13 +1,14 @@
 //! From the pictures of two sides to pairs: by equal names, by what is left without the word for the side, by number, or in their order.
 //!
 //! Out: pairs in natural order of their names, each with a name of its own, and the pictures without a partner. The first way that pairs
-//! most of the smaller side is taken, else the one that pairs most. Goes wrong: two pictures of a side that would be the same one of a pair.
+//! most of the smaller side is taken, else the one that pairs most; what it leaves over may have another naming that pairs it. Goes wrong:
+//! two pictures of a side that would be the same one of a pair.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use camino::{Utf8Path, Utf8PathBuf};
 
-use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem};
+use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem, tokens};
 use super::{PairBy, PairFiles};
 use crate::imaging::{Error, Result, Side};
 
@@ -16,6 +17,8 @@ use crate::imaging::{Error, Result, Side};
 pub struct Matched {
     /// How.
     pub by: PairBy,
+    /// How those were paired that are named in another way than most.
+    pub also: Option<PairBy>,
     /// In natural order of their names.
     pub pairs: Vec<PairFiles>,
     /// Pictures without a partner.
@@ -30,16 +33,22 @@ const NAMELESS: &str = "left-right";
 enum Way {
     EqualNames,
     OpenNames(Reach),
+    /// The numbers that are not the same throughout those names of a side that are alike but for them.
+    NumbersOfForm,
     /// The numbers that are not the same throughout a side.
     VaryingNumbers,
     /// The last number of each name: taken only where it pairs most of a side, for the seconds of a time agree by chance.
     LastNumber,
 }
 
-const WAYS: [Way; 5] = [
+/// Of them those that say something of few names, too: those of a second naming.
+const OF_FEW: [Way; 3] = [Way::EqualNames, Way::OpenNames(Reach::Words), Way::NumbersOfForm];
+
+const WAYS: [Way; 6] = [
     Way::EqualNames,
     Way::OpenNames(Reach::Words),
     Way::OpenNames(Reach::Letters),
+    Way::NumbersOfForm,
     Way::VaryingNumbers,
     Way::LastNumber,
 ];
@@ -48,7 +57,7 @@ impl Way {
     fn by(self) -> PairBy {
         match self {
             Way::EqualNames | Way::OpenNames(_) => PairBy::Name,
-            Way::VaryingNumbers | Way::LastNumber => PairBy::Number,
+            Way::NumbersOfForm | Way::VaryingNumbers | Way::LastNumber => PairBy::Number,
         }
     }
 
@@ -56,6 +65,7 @@ impl Way {
         match self {
             Way::EqualNames => stems.iter().map(|stem| Some((*stem).to_owned())).collect(),
             Way::OpenNames(reach) => stems.iter().map(|stem| Some(Open::new(stem, reach).key)).collect(),
+            Way::NumbersOfForm => numbers_of_form(stems),
             Way::VaryingNumbers => varying_numbers(stems),
             Way::LastNumber => {
                 stems.iter().map(|stem| plain_numbers(stem).last().map(|number| (*number).to_owned())).collect()
@@ -70,7 +80,7 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
         return Ok(in_order([left, right]));
     }
     let smaller = left.len().min(right.len());
-    let mut best = Matched { by: PairBy::Name, pairs: Vec::new(), single: Vec::new() };
+    let mut best = Matched { by: PairBy::Name, also: None, pairs: Vec::new(), single: Vec::new() };
     let mut refused = None;
     for way in WAYS.into_iter().filter(|way| by.is_none_or(|by| way.by() == by)) {
         match by_key([left, right], way.by(), &|stems| way.keys(stems)) {
@@ -83,20 +93,38 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
                     break;
                 }
             }
-            Err(_) if way == Way::LastNumber => (),
+            Err(_) if matches!(way, Way::NumbersOfForm | Way::LastNumber) => (),
             Err(e) => refused = refused.or(Some(e)),
         }
     }
     match refused {
         Some(e) if best.pairs.is_empty() => Err(e),
-        _ => Ok(best),
+        _ => Ok(with_the_rest(best, left, by)),
     }
+}
+
+/// What the naming of most leaves over may have one of its own.
+fn with_the_rest(mut matched: Matched, left: &[Utf8PathBuf], by: Option<PairBy>) -> Matched {
+    if matched.pairs.is_empty() {
+        return matched;
+    }
+    for way in OF_FEW.into_iter().filter(|way| by.is_none_or(|by| way.by() == by)) {
+        let [of_left, of_right]: [Vec<Utf8PathBuf>; 2] =
+            matched.single.iter().cloned().partition::<Vec<_>, _>(|path| left.contains(path)).into();
+        let Ok(rest) = by_key([&of_left, &of_right], way.by(), &|stems| way.keys(stems)) else { continue };
+        if !rest.pairs.is_empty() {
+            matched.also = Some(way.by()).filter(|by| *by != matched.by).or(matched.also);
+            matched.pairs.extend(rest.pairs);
+            matched.single = rest.single;
+        }
+    }
+    finished(matched)
 }
 
 /// Pairs by a key that each name has; `None` is a name without one.
 pub fn by_key(sides: [&[Utf8PathBuf]; 2], by: PairBy, key: &dyn Fn(&[&str]) -> Vec<Option<String>>) -> Result<Matched> {
     let mut keyed: BTreeMap<(String, String), [Vec<&Utf8PathBuf>; 2]> = BTreeMap::new();
-    let mut matched = Matched { by, pairs: Vec::new(), single: Vec::new() };
+    let mut matched = Matched { by, also: None, pairs: Vec::new(), single: Vec::new() };
     for side in Side::BOTH {
         let paths = sides[side as usize];
         let stems: Vec<&str> = paths.iter().map(|p| stem(p)).collect();
@@ -132,10 +160,12 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
     let (left, right) = (stem(left), stem(right));
     match by {
         PairBy::Number => {
-            let written = [left, right].map(|stem| numbers(stem).into_iter().rfind(|number| plain(number) == key));
+            let written = [left, right]
+                .map(|stem| numbers(stem).into_iter().rfind(|number| key.split('\0').next() == Some(plain(number))));
             match written {
                 [Some(left), Some(right)] if left == right => left.to_owned(),
-                _ => key.to_owned(),
+                // What is behind the mark tells forms of names apart.
+                _ => key.split('\0').next().unwrap_or_default().to_owned(),
             }
         }
         _ if left == right => left.to_owned(),
@@ -145,6 +175,30 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
             alike.map_or_else(|| key.to_owned(), |[a, b]| a.without_side(left, b))
         }
     }
+}
+
+/// The numbers that are not the same in names that are alike but for their numbers and words for a side, and what these names have in common.
+fn numbers_of_form(stems: &[&str]) -> Vec<Option<String>> {
+    let form = |stem: &str| {
+        let open = Open::new(stem, Reach::Words).key;
+        let is_number = |token: &str| token.starts_with(|c: char| c.is_ascii_digit());
+        tokens(&open).into_iter().map(|token| if is_number(token) { "#" } else { token }).collect::<String>()
+    };
+    let mut forms: BTreeMap<String, Vec<usize>> = BTreeMap::new();
+    for (at, stem) in stems.iter().enumerate() {
+        forms.entry(form(stem)).or_default().push(at);
+    }
+    let mut keys = vec![None; stems.len()];
+    for (form, members) in forms {
+        let alike: Vec<&str> = members.iter().map(|at| stems[*at]).collect();
+        // Of one name nobody knows which of its numbers count: all do.
+        let of_form =
+            if alike.len() > 1 { varying_numbers(&alike) } else { vec![Some(plain_numbers(alike[0]).join("_"))] };
+        for (at, numbers) in members.into_iter().zip(of_form) {
+            keys[at] = numbers.filter(|numbers| !numbers.is_empty()).map(|numbers| format!("{numbers}\0{form}"));
+        }
+    }
+    keys
 }
 
 /// The numbers that are not the same in all names of a side, where all have as many.
@@ -184,7 +238,7 @@ fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
     } else {
         Vec::new()
     };
-    Matched { by: PairBy::Order, pairs, single: Vec::new() }
+    Matched { by: PairBy::Order, also: None, pairs, single: Vec::new() }
 }
 
 /// Names that are their own, and the order of them.

@@ -126,7 +126,7 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
         depth: first.depth - 1,
         places: below.iter().map(|folder| folder.path.clone()).collect(),
         sides: [picture(left).collect(), picture(right).collect()],
-        matched: Matched { by: PairBy::Name, pairs, single: Vec::new() },
+        matched: Matched { by: PairBy::Name, also: None, pairs, single: Vec::new() },
         sideless: 0,
         aside: below.iter().map(|folder| folder.aside).sum(),
     })

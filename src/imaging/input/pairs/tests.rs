@@ -165,6 +165,30 @@ fn numbers_pair_where_names_do_not() {
 }
 
 #[test]
+fn a_second_naming_pairs_what_the_first_leaves_over() {
+    let series = |side: usize| (0..9).map(move |n| format!("cam{side}/image{side}_{n}.png"));
+    let lone = ["cam0/2.bmp", "cam0/3.bmp", "cam0/Image1.bmp", "cam1/2.bmp", "cam1/8.bmp"].map(str::to_owned);
+    let (_keep, path) = folder(&series(0).chain(series(1)).chain(lone).collect::<Vec<_>>());
+    for by in [None, Some(PairBy::Number)] {
+        let found = read(&path, by).unwrap();
+        assert_eq!((found.pairs.len(), found.pairs[0].pair.as_str()), (10, "2"), "{found:?}");
+        assert_eq!(found.taken.split(':').next(), Some("10 pairs by number"));
+        assert_eq!(found.left_out().unwrap(), "left out: 3 pictures without a partner (Image1.bmp, 3.bmp, 8.bmp)");
+    }
+    let by_name = read(&path, Some(PairBy::Name)).unwrap();
+    assert_eq!((by_name.pairs.len(), by_name.single.len()), (1, 21));
+    // Names that pair most come before numbers, which pair what these leave over.
+    let named = ["p1", "p2", "p3"].map(|name| [format!("a/{name}.png"), format!("b/{name}.png")]);
+    let counted = [7, 8].map(|n| [format!("a/x0_{n}.png"), format!("b/x1_{n}.png")]);
+    let files = [named.concat(), counted.concat()].concat();
+    let both = pairing(&files.iter().map(String::as_str).collect::<Vec<_>>());
+    assert_eq!(both.taken.split(':').next(), Some("5 pairs by name and number"));
+    // One number of one name says nothing.
+    let chance = pairing(&["a/p1.png", "b/p1.png", "a/p2.png", "b/p2.png", "a/x4_7.png", "b/x5_7.png"]);
+    assert_eq!((chance.pairs.len(), chance.single.len()), (2, 2));
+}
+
+#[test]
 fn order_needs_equal_counts() {
     let said = complaint(&["cam1/a.png", "cam1/b.png", "cam2/c.png"], Some(PairBy::Order));
     assert!(said.contains("2 left pictures and 1 right ones cannot be paired in their order"), "{said}");
@@ -190,7 +214,7 @@ fn of_two_formats_of_one_name_the_one_without_loss_is_read() {
     let files: Vec<[&str; 2]> =
         found.pairs.iter().map(|p| [&p.left, &p.right].map(|path| path.file_name().unwrap())).collect();
     assert_eq!(files, [["left_1.png", "right_1.PNG"], ["left_2.bmp", "right_2.jpg"]]);
-    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures in a lossy format beside others of the same names");
+    assert_eq!(found.left_out().unwrap(), "left out: 2 pictures in another format beside others of the same names");
 }
 
 #[test]
@@ -217,6 +241,12 @@ fn folders_without_pairs_say_what_they_hold() {
     assert!(said.contains("`stereocal camera-check LEFT RIGHT`"), "{said}");
     let missing = crate::diagnostic::report(&read(Utf8Path::new("/no/such/folder"), None).unwrap_err());
     assert!(missing.contains("not found") && missing.contains("/no/such/folder"), "{missing}");
+}
+
+#[test]
+fn pictures_that_may_hold_both_views_are_said_to() {
+    let said = complaint(&["raw/view_001.png", "raw/view_002.png", "raw/view_003.png"], None);
+    assert!(said.contains("holds both views, `--side-by-side` or `--top-bottom` cuts it in two"), "{said}");
 }
 
 #[test]
