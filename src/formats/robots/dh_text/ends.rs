@@ -27,8 +27,8 @@ impl End {
 pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], String) {
     let mut said = String::new();
     let ends = ["base", "tool"].map(|name| {
-        let (line, value) = told(code, name)?;
-        let found = product(code, known, value, 0);
+        let (line, value, once) = told(code, name)?;
+        let found = if once { product(code, known, value, 0) } else { None };
         match found {
             Some(transform) if transform == Transform::identity() => None,
             Some(transform) => {
@@ -38,7 +38,7 @@ pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], String) {
             None => {
                 let value = value.split_whitespace().collect::<Vec<_>>().join(" ");
                 said += &format!(
-                    ", LEFT OUT: the {name} of line {line}, `{value}`, which is no product of shifts and turns by numbers; write it into the robot file's [{}]",
+                    ", LEFT OUT: the {name} of line {line}, `{value}`, which is no product of shifts and turns by numbers, or another line says it otherwise; write it into the robot file's [{}]",
                     if name == "base" { "base" } else { "flange" }
                 );
                 None
@@ -48,8 +48,8 @@ pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], String) {
     (ends, said)
 }
 
-/// The last thing that is told to be the base or the tool: in a call that makes a robot, or of a robot.
-fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str)> {
+/// The last thing that is told to be the base or the tool, in a call that makes a robot, or of a robot; and whether nothing else is.
+fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str, bool)> {
     let found = code.match_indices(name).filter_map(|(at, _)| {
         let before = &code[..at];
         let statement = before.rsplit(['\n', ';']).next().unwrap_or("");
@@ -64,7 +64,9 @@ fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str)> {
         let is_none = matches!(value.trim(), "None" | "base" | "tool") && told_itself(code, name, value.trim());
         ((of_robot || inside) && !is_none).then(|| (1 + before.matches('\n').count() as u64, value.trim()))
     });
-    found.last()
+    let all: Vec<(u64, &str)> = found.collect();
+    let &(line, value) = all.last()?;
+    Some((line, value, all.iter().all(|(_, other)| *other == value)))
 }
 
 /// Whether a value says nothing: none, or an argument that nothing in the text sets.
@@ -88,7 +90,11 @@ fn assigned<'a>(code: &'a str, name: &str) -> Option<&'a str> {
     let value = |line: &'a str| {
         line.trim_start().strip_prefix(name)?.trim_start().strip_prefix('=').filter(|v| !v.starts_with('='))
     };
-    code.lines().filter_map(value).next_back().map(|value| value.trim().trim_end_matches(';'))
+    // An argument on a line of its own is none.
+    code.lines()
+        .filter_map(value)
+        .rfind(|value| !value.trim_end().ends_with(','))
+        .map(|value| value.trim().trim_end_matches(';'))
 }
 
 /// A product of shifts and turns.

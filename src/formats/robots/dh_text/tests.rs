@@ -277,11 +277,15 @@ fn base_and_tool_of_a_toolbox_are_taken_where_they_are_numbers() {
     }
     let (ends, said) = of("tool=grip(3)");
     assert!(ends == [None; 2] && said.contains("LEFT OUT: the tool of line 8, `grip(3)`"), "{said}");
+    // One of two arms, and which is meant is not known.
+    let arms = "        if left:\n            self.base = SE3(0, 0.3, 0)\n        else:\n            self.base = SE3(0, -0.3, 0)\n";
+    let two = read(&format!("{MODEL}{arms}"), false).unwrap().links.unwrap();
+    assert!(two.ends == [None; 2] && two.ends_said.contains("LEFT OUT: the base of line 12"), "{}", two.ends_said);
     // Names, and what is told of the robot afterwards.
     let ends = |code: &str| read(code, false).unwrap().links.unwrap().ends;
     let named = MODEL
         .replace("        super", "        h = 0.05\n        tool = SE3(0, 0, 2*h)\n        super")
-        .replace("name=", "tool=tool, name=");
+        .replace("name=", "\n            tool=tool,\n            name=");
     assert_eq!(ends(&named)[1].map(|e| e.in_mm(1.0).translation.z), Some(0.1));
     let matlab = "L(1) = Link('d', 0.1, 'a', 0.2);\nL(2) = Link('d', 0, 'a', 0.3);\nr = SerialLink(L, 'name', 'two', 'tool', transl(0, 0, 0.1));\nr.base = transl([0.5 0 0]);\n";
     let found = ends(&matlab.replace("0.5 0 0", "0.5, 0, 0"));
