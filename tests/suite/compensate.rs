@@ -81,7 +81,7 @@ fn targets_come_back_where_they_were_meant() {
     std::fs::write(folder.path().join("identified.toml"), file::to_toml(&tipped)).unwrap();
     let apart = run(folder.path(), &["targets.csv", "--out", "tipped"], 0);
     assert!(apart.contains("the tools of the two files are 5.000 mm apart, and this is corrected too"), "{apart}");
-    assert!(apart.contains("`--tool X,Y,Z` names the one that works"), "{apart}");
+    assert!(apart.contains("`--tool X,Y,Z` names the tool that works"), "{apart}");
     let named = run(folder.path(), &["targets.csv", "--out", "named", "--tool", "0,0,100"], 0);
     assert!(!named.contains("the tools of the two files"), "{named}");
     assert!(
