@@ -141,7 +141,7 @@ fn lines(recheck: &Recheck) -> Table {
 /// The lines on stdout.
 pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -> String {
     format!(
-        "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target\n{}\n{} in {}\nreport: {}\n",
+        "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target, once placed anew\n{}\n{} in {}\nreport: {}\n",
         word(judged.standing),
         sentence(recheck, judged, |mm| format!("{mm:.4}")),
         next(judged, recheck),
@@ -155,13 +155,12 @@ pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -
 /// The report. Also shows the run's `warnings`.
 pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[String]) -> Result<String> {
     let Judged { standing, tolerance_mm, .. } = judged;
-    let numbers = [
-        (recheck.effect_mm, "movement of the target beyond chance"),
-        (recheck.at_most_mm, "not ruled out"),
-        (recheck.seen_mm, "would have been seen"),
-        (tolerance_mm, "tolerance"),
-    ]
-    .map(|(mm, what)| (format!("{} mm", two_digits(mm)), what));
+    let of_target = match recheck.cause().is_empty() {
+        true => (recheck.at_most_mm, "movement of the target that is not ruled out"),
+        false => (recheck.effect_mm, "movement of the target beyond chance"),
+    };
+    let numbers = [of_target, (recheck.seen_mm, "would have been seen"), (tolerance_mm, "tolerance")]
+        .map(|(mm, what)| (format!("{} mm", two_digits(mm)), what));
     let text = format!("{}. Next: {}.", sentence(recheck, judged, two_digits), next(judged, recheck));
     let (sensor, moved) = match recheck.by_cameras {
         true => ("once the cameras' place was found anew", "cameras that moved"),
