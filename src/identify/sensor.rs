@@ -152,11 +152,13 @@ impl Scatter {
         self.point_mm * self.point_mm + self.hidden_mm2
     }
 
-    /// Degrees of freedom of a mean square that is to be expected of fresh poses, of which so large a share is their own scatter: the rest follows from
+    /// Degrees of freedom of errors that are to be expected of fresh poses, by their covariances, mm^2: a share of them is the poses' own scatter, the rest follows from
     /// readings that are as large as the residuals say (Satterthwaite, 1946). What covariances state is known, and what they hide is there by its
     /// expectation already. At the least two, of which a mean can be told.
-    pub fn freedom_of(&self, share_of_fresh: f64) -> f64 {
+    pub fn freedom_of(&self, errors_mm2: &[Matrix3<f64>]) -> f64 {
         let fresh_mm2 = self.fresh_mm2().max(f64::MIN_POSITIVE);
+        let total_mm2 = errors_mm2.iter().map(Matrix3::trace).sum::<f64>() / errors_mm2.len().max(1) as f64;
+        let share_of_fresh = (3.0 * self.fresh_mm2() / total_mm2).min(1.0);
         let told = if self.stated == 1.0 { self.point_mm * self.point_mm / fresh_mm2 } else { 1.0 };
         let of_fresh = share_of_fresh * self.fresh_sd_mm2 / fresh_mm2;
         let of_rest = (1.0 - share_of_fresh) * (2.0 / self.freedom).sqrt();

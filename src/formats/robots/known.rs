@@ -8,10 +8,11 @@ use serde::Deserialize;
 
 use crate::files::provenance::{Digested, Provenance};
 use crate::identify::judge::lengths::MEAN_OVER_RMS;
-use crate::identify::judge::locate::{REPEATABILITY_MM, Trust};
+use crate::identify::judge::locate::Trust;
 use crate::identify::judge::recheck::Before;
 use crate::identify::judge::uncertainty::Covariance;
 use crate::identify::model::ladder::Terms;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::measurements::Given;
 use crate::robot::{Joint, Parameter, Robot};
 

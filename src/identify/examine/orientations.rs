@@ -3,7 +3,7 @@
 //! In: a data set and the nominal robot. Out: the set as the best hypothesis has it, and its name. The turn of the target between two
 //! poses of a placement is that of the flange, about an axis that stands in the sensor's frame as the flange's does in the base: one rotation
 //! brings all axes together (Wahba, 1965), whatever the sensor's frame and the target's are. Where none does, each hypothesis is tried, and the one
-//! with which they agree is taken; each placement by itself.
+//! with which they agree is taken; each placement by itself where it has enough poses.
 //! What goes wrong: where all turns are about one axis, an inverse rotation is not told from the rotation.
 
 use std::f64::consts::PI;
@@ -75,28 +75,39 @@ enum Told {
 pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Vec<Finding>) {
     let mut set = set.clone();
     let all: Vec<usize> = (0..set.groups.len()).collect();
-    let told = told(&set, robot, &all);
-    if let Told::Meant(..) = told {
-        let finding = mend(&mut set, &all, told, asked);
-        return (set, finding.into_iter().collect());
-    }
-    // Sensors that write differently, each by its placement where it has enough poses.
+    // Sensors may write differently: each placement that has enough poses tells by itself, the others together.
     let has_enough = |&group: &usize| set.rows(|pose| pose.group == group).len() >= FEWEST;
-    let of_groups: Vec<(usize, Told)> =
-        all.iter().copied().filter(has_enough).map(|group| (group, self::told(&set, robot, &[group]))).collect();
-    let is_odd = |told: &Told| !matches!(told, Told::Suit);
-    if !is_odd(&told) && !of_groups.iter().any(|(_, told)| is_odd(told)) {
+    let (large, small): (Vec<usize>, Vec<usize>) = all.iter().copied().partition(has_enough);
+    let parts = large.into_iter().map(|group| vec![group]).chain(Some(small).filter(|small| !small.is_empty()));
+    let mut parts: Vec<(Vec<usize>, Told)> = parts
+        .map(|groups| {
+            let told = told(&set, robot, &groups);
+            (groups, told)
+        })
+        .collect();
+    let word = |part: &(Vec<usize>, Told)| part.1.word();
+    if parts.iter().all(|part| word(part) == word(&parts[0])) {
+        parts = vec![(all.clone(), told(&set, robot, &all))];
+    }
+    if parts.iter().all(|(_, told)| matches!(told, Told::Suit)) {
         let usual_rad =
             difference_rad(&set, robot, &all, UnitQuaternion::from_scaled_axis).map_or(0.0, |[size, _]| size);
         let (set, finding) = without_turned(set, robot, EXPLAINS * usual_rad);
         return (set, finding.into_iter().collect());
     }
-    if of_groups.iter().all(|(_, told)| matches!(told, Told::Contradict(_))) {
-        let finding = mend(&mut set, &all, told, asked);
-        return (set, finding.into_iter().collect());
-    }
-    let findings = of_groups.into_iter().filter_map(|(group, told)| mend(&mut set, &[group], told, asked)).collect();
+    let findings = parts.into_iter().filter_map(|(groups, told)| mend(&mut set, &groups, told, asked)).collect();
     (set, findings)
+}
+
+impl Told {
+    /// What is alike where this is.
+    fn word(&self) -> &'static str {
+        match self {
+            Told::Suit => "suit",
+            Told::Meant(name, ..) => name,
+            Told::Contradict(_) => "contradict",
+        }
+    }
 }
 
 fn told(set: &Dataset, robot: &Robot, groups: &[usize]) -> Told {
@@ -114,9 +125,11 @@ fn told(set: &Dataset, robot: &Robot, groups: &[usize]) -> Told {
 
 /// Takes the orientations of these groups as they are meant, or leaves them out.
 fn mend(set: &mut Dataset, groups: &[usize], told: Told, asked: bool) -> Option<Finding> {
-    let whose = match groups {
-        [one] if set.groups.len() > 1 => format!("the orientations of group {}", set.groups[*one].name),
-        _ => "the orientations".to_owned(),
+    let names: Vec<&str> = groups.iter().map(|&group| set.groups[group].name.as_str()).collect();
+    let whose = match groups.len() {
+        all if all == set.groups.len() => "the orientations".to_owned(),
+        1 => format!("the orientations of group {}", names[0]),
+        _ => format!("the orientations of groups {}", names.join(", ")),
     };
     let rotations = set.poses.iter_mut().filter(|pose| groups.contains(&pose.group));
     let rotations = rotations.filter_map(|pose| match &mut pose.reading {
@@ -272,6 +285,31 @@ mod tests {
                 let [a, b] = [a, b].map(|p| UnitQuaternion::from_scaled_axis(p.reading.rotation_rad().unwrap()));
                 assert!(a.angle_to(&b) < 1e-6, "{name}");
             }
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_writes_differently_is_mended_alone() {
+        let world = synthetic::world(80, 0.0, 2);
+        for odd in [["g1"].as_slice(), &["g0", "g1", "g2"]] {
+            let rows = |is_odd: &dyn Fn(&str) -> bool| {
+                let mut rows = world.rows.clone();
+                for row in &mut rows {
+                    let turn = world.truth.base_from_flange(&row.at.joints_rad()).rotation.scaled_axis();
+                    let turn = if is_odd(&row.at.group) { -turn } else { turn };
+                    if let Observed::Position { rotation_rad, .. } = &mut row.observed {
+                        *rotation_rad = Some(turn);
+                    }
+                }
+                Dataset::new(&rows).unwrap()
+            };
+            let (mended, findings) = examine(&rows(&|group| odd.contains(&group)), &world.nominal, false);
+            let said: Vec<String> = findings.iter().map(Finding::sentence).collect();
+            assert!(
+                odd.iter().all(|g| said.iter().any(|s| s.contains(&format!("of group {g} are inverse")))),
+                "{said:?}"
+            );
+            assert_eq!((mended, said.len()), (rows(&|_| false), odd.len()));
         }
     }
 

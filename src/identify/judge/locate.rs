@@ -14,7 +14,6 @@ use super::placement::Placed;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::rows::Rows;
-pub use crate::identify::sensor::REPEATABILITY_MM;
 use crate::identify::sensor::{Raw, Scatter};
 use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;

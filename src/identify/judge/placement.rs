@@ -207,9 +207,7 @@ impl Placed {
             Matrix3::from_fn(|r, c| total[(r, c)]) + Matrix3::identity() * (self.fresh_mm2 / 3.0)
         };
         let covariances: Vec<Matrix3<f64>> = self.columns(index, &poses).into_iter().map(covariance).collect();
-        let total_mm2 = covariances.iter().map(Matrix3::trace).sum::<f64>() / covariances.len().max(1) as f64;
-        let told = self.scatter.freedom_of((3.0 * self.scatter.fresh_mm2() / total_mm2).min(1.0));
-        Lengths::new(&covariances, told)
+        Lengths::new(&covariances, self.scatter.freedom_of(&covariances))
     }
 }
 

@@ -7,7 +7,7 @@
 
 use super::errors::{Judge, RowError};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::locate::REPEATABILITY_MM;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::Robot;
 use crate::statistics::median;
 

@@ -104,16 +104,15 @@ impl Expected {
                 of_errors[i].copy_from(&(of_robot + of_frame + fresh));
             }
         }
-        let total_mm2 = rows.iter().map(|&row| of_errors[row].trace()).sum::<f64>() / rows.len().max(1) as f64;
-        let told = formulation.rows.scatter.freedom_of((3.0 * scatter_mm2 / total_mm2).min(1.0));
-        let of_rows = |all: &[Matrix3<f64>]| Lengths::new(&rows.iter().map(|&row| all[row]).collect::<Vec<_>>(), told);
-        let Lengths { mean_mm, p95_mm, max_mm } = of_rows(&of_errors);
+        let of_rows = |all: &[Matrix3<f64>]| rows.iter().map(|&row| all[row]).collect::<Vec<Matrix3<f64>>>();
+        let told = formulation.rows.scatter.freedom_of(&of_rows(&of_errors));
+        let Lengths { mean_mm, p95_mm, max_mm } = Lengths::new(&of_rows(&of_errors), told);
         let length = |row: &usize| (set.poses[*row].name.clone(), Length::new(&of_errors[*row], told).mean_mm());
         Expected {
             mean_mm,
             p95_mm,
             max_mm,
-            of_robot_mm: of_rows(&of_robots).mean_mm,
+            of_robot_mm: Lengths::new(&of_rows(&of_robots), told).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
             freedom: formulation.rows.scatter.freedom,
             poses: region(set),

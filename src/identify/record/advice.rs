@@ -13,8 +13,8 @@ use crate::identify::data::still::constant_joints;
 use crate::identify::data::unused;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
-use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::run::{Against, Identification};
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::{Advice, Robot};
 
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.

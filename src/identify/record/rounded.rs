@@ -2,9 +2,8 @@
 //!
 //! In: joints and points as they were printed, and what the fit leaves. Out: joint angles so coarse that they account for what is left; and points
 //! that agree with the chain of links as closely as the digits go, so that nothing is left for an instrument or for how well an arm comes back.
-//! Method: a step of rounding, one for each power of ten
-//! where the same number of digits was written of all, has the variance of a uniform error, that of each joint through its lever; the fit's chi-squared against it. Goes
-//! wrong: a display that cuts digits off scatters no more, but shifts; averages of several readings stand on no step.
+//! Method: a step of rounding, one for each power of ten where the same number of digits was written of all, has the variance of a uniform error, that of
+//! each joint through its lever; the fit's chi-squared against it. Goes wrong: a display that cuts digits off scatters no more, but shifts; averages of several readings stand on no step.
 
 use std::collections::BTreeMap;
 
@@ -12,9 +11,9 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::finding::Finding;
-use crate::identify::judge::locate::REPEATABILITY_MM;
 use crate::identify::record::file::Smooth;
 use crate::identify::run::Identification;
+use crate::identify::sensor::REPEATABILITY_MM;
 
 /// Steps that numbers are rounded to, deg and mm, coarse ones first.
 const STEPS: [f64; 9] = [1.0, 0.5, 0.1, 0.05, 0.01, 0.005, 1e-3, 1e-4, 1e-5];

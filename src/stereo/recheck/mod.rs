@@ -3,9 +3,9 @@
 //! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far that moves a
 //! length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs give a rig by themselves, from the old
 //! one on; the difference of its numbers against both covariances, all of them together and each cause as a direction of its own
-//! ([`crate::difference`]), all looks together at one level; a change is what shows from the old rig on as well as from the new one, and where the pairs' own rig lies several times
-//! farther off than the equations at the old one foretell, the latter tell its size. A change of a cause is seen in nineteen of twenty such tests from
-//! the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
+//! ([`crate::difference`]), all looks together at one level; a change is what shows from the old rig on as well as from the new one, and where
+//! the pairs' own rig lies several times farther off than the equations at the old one foretell, the latter tell its size. A change of a cause
+//! is seen in nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
 //! see a focus; that is what the stated figures say.
 
 #[cfg(test)]

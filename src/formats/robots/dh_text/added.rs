@@ -5,6 +5,7 @@
 
 use super::link::{CALLS, Link, Wrong};
 use super::lists::up_to;
+use super::robots;
 
 /// Words between a list's name and what is added to it.
 const ADDS: [&str; 4] = [".extend(", ".append(", ".insert(", "+="];
@@ -66,9 +67,9 @@ fn assigned<'a>(code: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
 
 /// A call that makes a robot of another one's links, and what it takes of it.
 fn robot_of_another(code: &str) -> Option<(usize, &str)> {
-    ["DHRobot(", "super().__init__(", "SerialLink("].iter().find_map(|call| {
+    robots::CALLS.iter().find_map(|call| {
         code.match_indices(call).find_map(|(at, _)| {
-            let inside = &code[at + call.len()..];
+            let inside = code[at + call.len()..].strip_prefix('(')?;
             let first = inside[..up_to(inside, &[','])].trim();
             first.contains(".links").then_some((at, first))
         })

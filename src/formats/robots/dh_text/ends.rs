@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 use super::link::Known;
 use super::lists::{extent, up_to};
+use super::robots;
 use crate::geometry::Transform;
 use crate::tables::expression::evaluate;
 
@@ -48,7 +49,8 @@ pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], String) {
     (ends, said)
 }
 
-/// The last thing that is told to be the base or the tool, in a call that makes a robot, or of a robot; and whether nothing else is.
+/// The last thing that is told to be the base or the tool, in a call that makes a robot, or of a robot; and whether nothing else is. `None` and an argument
+/// of the same name that nothing in the text sets say nothing.
 fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str, bool)> {
     let found = code.match_indices(name).filter_map(|(at, _)| {
         let before = &code[..at];
@@ -61,23 +63,18 @@ fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str, bool)> {
             && statement.trim().trim_end_matches('.').chars().all(|c| c.is_alphanumeric() || c == '_');
         let inside = !before.ends_with(|c: char| c.is_alphanumeric() || matches!(c, '_' | '.')) && in_call(before);
         let value = &value[..if of_robot { up_to(value, &['\n', ';']) } else { up_to(value, &[',']) }];
-        let is_none = matches!(value.trim(), "None" | "base" | "tool") && told_itself(code, name, value.trim());
-        ((of_robot || inside) && !is_none).then(|| (1 + before.matches('\n').count() as u64, value.trim()))
+        let says_nothing = value.trim() == "None" || value.trim() == name && assigned(code, name).is_none();
+        ((of_robot || inside) && !says_nothing).then(|| (1 + before.matches('\n').count() as u64, value.trim()))
     });
     let all: Vec<(u64, &str)> = found.collect();
     let &(line, value) = all.last()?;
     Some((line, value, all.iter().all(|(_, other)| *other == value)))
 }
 
-/// Whether a value says nothing: none, or an argument that nothing in the text sets.
-fn told_itself(code: &str, name: &str, value: &str) -> bool {
-    value == "None" || value == name && assigned(code, name).is_none()
-}
-
 /// Whether the text so far is inside of a call that makes a robot.
 fn in_call(before: &str) -> bool {
-    let calls = ["DHRobot(", "SerialLink(", "super().__init__("];
-    let opened = calls.iter().filter_map(|call| before.rfind(call).map(|at| (at, at + call.len()))).max();
+    let last = |call: &&str| before.rfind(&format!("{call}(")).map(|at| (at, at + call.len() + 1));
+    let opened = robots::CALLS.iter().filter_map(last).max();
     opened.is_some_and(|(at, start)| {
         let statement = before[..at].rsplit('\n').next().unwrap_or("");
         !["class ", "def "].iter().any(|word| statement.contains(word))

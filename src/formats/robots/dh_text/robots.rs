@@ -9,7 +9,7 @@ use super::link::Wrong;
 use super::lists::{extent, up_to};
 
 /// Calls that make a robot of links.
-const CALLS: [&str; 3] = ["SerialLink", "DHRobot", "super().__init__"];
+pub(super) const CALLS: [&str; 3] = ["SerialLink", "DHRobot", "super().__init__"];
 
 /// A call that makes a robot.
 #[derive(Debug)]

@@ -184,26 +184,34 @@ fn sightings(poses: &[Shown]) -> Vec<Vec<Sighting>> {
 /// Makes targets that moved others from there on; each with the index that it has from there on. One that moved by less than a robot repeats to
 /// stays what it is, and what is said of it is the other: as another target it would cost orientations, and as the same one hardly anything.
 fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> (Vec<(Moved, usize)>, Option<String>) {
-    let mut list = Vec::new();
+    let (mut list, mut slight) = (Vec::new(), Vec::new());
     let most = names.len();
-    while list.len() < most {
-        let seen = sightings(poses);
-        let Some(moved) = moved::next(&seen, names.len()) else { break };
-        let size_mm = moved::size_mm(&seen, names.len(), moved);
+    // While it is searched on, one that hardly moved is another as well, so that it hides no other step: which target each is, and from which pose on.
+    let mut seen = sightings(poses);
+    let mut parts: Vec<(usize, usize)> = (0..most).map(|target| (target, 0)).collect();
+    while list.len() + slight.len() < most {
+        let Some(moved) = moved::next(&seen, parts.len()) else { break };
+        let (size_mm, from) = (moved::size_mm(&seen, parts.len(), moved), moved.from);
+        let later = seen[from..].iter_mut().flatten();
+        later.filter(|s| s.target == moved.target).for_each(|s| s.target = parts.len());
+        let (target, pose) = (parts[moved.target].0, &poses[from].first.at.pose);
         if size_mm < REPEATABILITY_MM {
-            let (name, pose) = (&names[moved.target], &poses[moved.from].first.at.pose);
-            let said = format!(
-                "target {name} stands {size_mm:.4} mm elsewhere from {pose} on, less than a robot repeats to, and is used all the same"
-            );
-            return (list, Some(said));
+            slight.push(format!(
+                "target {} stands {size_mm:.4} mm elsewhere from {pose} on, less than a robot repeats to, and is used all the same",
+                names[target]
+            ));
+            parts.push((target, from));
+            continue;
         }
         let new = names.len();
-        names.push(format!("{} from {} on", names[moved.target], poses[moved.from].first.at.pose));
-        let later = poses[moved.from..].iter_mut().flat_map(|pose| &mut pose.sightings);
-        later.filter(|s| s.target == moved.target).for_each(|s| s.target = new);
-        list.push((moved, new));
+        names.push(format!("{} from {pose} on", names[target]));
+        let later = poses[from..].iter_mut().flat_map(|pose| &mut pose.sightings);
+        later.filter(|s| s.target == target).for_each(|s| s.target = new);
+        list.push((Moved { target, or: moved.or.map(|or| parts[or].0), from }, new));
+        parts.iter_mut().filter(|part| part.0 == target && part.1 >= from).for_each(|part| part.0 = new);
+        parts.push((new, from));
     }
-    (list, None)
+    (list, (!slight.is_empty()).then(|| slight.join("; ")))
 }
 
 /// Of a covariance that may be singular.

@@ -185,6 +185,22 @@ fn a_target_that_moved_by_next_to_nothing_is_used_all_the_same() {
 }
 
 #[test]
+fn a_target_that_hardly_moved_hides_no_other_that_did() {
+    let (mut slightly, count) = (TARGETS, 4);
+    slightly[2].1 += 0.008 * Vector3::new(0.6, -0.7, 0.4);
+    let mut later = slightly;
+    later[0].1 += Vector3::new(0.3, 0.9, -0.3);
+    let world = synthetic::world(40, 0.0, 6);
+    let [before, after, last] =
+        [TARGETS, slightly, later].map(|t| synthetic::of_targets(&world, &t[..count], 0.0008, 6));
+    let rows = before[..count * 14].iter().chain(&after[count * 14..count * 27]).chain(&last[count * 27..]);
+    let (_, targets) = one(&rows.cloned().collect::<Vec<_>>());
+    assert!(targets.sentence().contains("target c stands"), "{}", targets.sentence());
+    let told = |name: &str| targets.findings.iter().any(|f| f.sentence().contains(&format!("target {name} was moved")));
+    assert!(told("a") && !told("c"), "{:?}", targets.findings);
+}
+
+#[test]
 fn two_targets_and_targets_on_a_line_give_their_mean() {
     let world = synthetic::world(20, 0.0, 2);
     let line: Vec<(&str, Vector3<f64>)> =

@@ -13,7 +13,7 @@ use super::{BEATS, CHANCE, MUCH_LARGER, SHORTEST, Table, by_chance};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
 use crate::identify::finding::Finding;
-use crate::identify::judge::locate::REPEATABILITY_MM;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::corrections::LoadPoint;
 use crate::robot::{Parameter, Robot};
 

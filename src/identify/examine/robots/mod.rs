@@ -22,7 +22,7 @@ use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::examine::hypothesis::still;
 use crate::identify::examine::{sessions, shifted};
 use crate::identify::finding::Finding;
-use crate::identify::judge::locate::REPEATABILITY_MM;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::identify::settings::Settings;
 use crate::robot::Robot;
 use crate::statistics::median;

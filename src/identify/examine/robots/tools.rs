@@ -15,7 +15,7 @@ use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
 use crate::identify::finding::Finding;
-use crate::identify::judge::locate::REPEATABILITY_MM;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::Robot;
 
 /// Tools of parts of the rows.

@@ -1,6 +1,7 @@
 use nalgebra::Matrix3;
 
 use super::*;
+use crate::identify::sensor::REPEATABILITY_MM;
 use crate::identify::synthetic;
 use crate::measurements::{Measurement, Observed};
 
