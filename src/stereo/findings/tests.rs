@@ -317,8 +317,10 @@ fn a_board_that_moves_while_rows_are_read_out_is_named() {
         assert_eq!(named.cause, Cause::NotSimultaneous.word());
         let size = named.size.unwrap();
         assert!((size / mm - 1.0).abs() < 0.3, "{mm}: {named:?}");
-        let verdict = judged(&found, told.clone(), Standards::default(), 0.05).verdict;
-        assert!(mm < 1.0 || verdict != Verdict::Pass, "{mm}: {named:?}");
+        let judged = judged(&found, told.clone(), Standards::default(), 0.05);
+        assert!(mm < 1.0 || judged.verdict != Verdict::Pass, "{mm}: {named:?}");
+        let line = judged.evidence.iter().find(|line| line.what == "changes over the pairs").unwrap();
+        assert!(line.remedy.starts_with("hold the board still"), "{line:?}");
     }
 }
 

@@ -9,6 +9,7 @@ use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::pairs::Cause;
 use crate::stereo::solve::uncertainty::{WORST_FOCAL_SIGMA, worst_focal_sigma};
 
 /// Steps and drifts that are in the rig.
@@ -31,13 +32,12 @@ pub(super) fn findings(case: &Case) -> Evidence {
         };
         format!("{}. {effect}", told.join("; "))
     };
-    Evidence::of_length(
-        "changes over the pairs",
-        "clamp the cameras, switch autofocus off, and photograph again",
-        Some(value),
-        case,
-        detail,
-    )
+    let board_moved = |finding: &&Finding| finding.cause == Cause::NotSimultaneous.word();
+    let remedy = match left.iter().all(board_moved) && !left.is_empty() {
+        true => "hold the board still while its pictures are taken, and photograph again",
+        false => "clamp the cameras, switch autofocus off, and photograph again",
+    };
+    Evidence::of_length("changes over the pairs", remedy, Some(value), case, detail)
 }
 
 pub(super) fn pair_scatter(case: &Case) -> Evidence {
