@@ -281,11 +281,13 @@ mod tests {
         for (written, name) in ways {
             let (right, mended, said) = said(written);
             assert!(said.as_ref().is_some_and(|s| s.contains(name)), "{name}: {said:?}");
-            for (a, b) in right.poses.iter().zip(&mended.poses) {
-                let [a, b] = [a, b].map(|p| UnitQuaternion::from_scaled_axis(p.reading.rotation_rad().unwrap()));
-                assert!(a.angle_to(&b) < 1e-6, "{name}");
-            }
+            assert!(are_alike(&right, &mended), "{name}");
         }
+    }
+
+    fn are_alike(a: &Dataset, b: &Dataset) -> bool {
+        let turn = |p: &Pose| UnitQuaternion::from_scaled_axis(p.reading.rotation_rad().unwrap());
+        a.poses.iter().zip(&b.poses).all(|(a, b)| turn(a).angle_to(&turn(b)) < 1e-6)
     }
 
     #[test]
@@ -309,7 +311,8 @@ mod tests {
                 odd.iter().all(|g| said.iter().any(|s| s.contains(&format!("of group {g} are inverse")))),
                 "{said:?}"
             );
-            assert_eq!((mended, said.len()), (rows(&|_| false), odd.len()));
+            assert_eq!(said.len(), odd.len());
+            assert!(are_alike(&mended, &rows(&|_| false)), "{said:?}");
         }
     }
 
