@@ -94,7 +94,19 @@ impl Cell {
         if !self.has_markers() {
             return f64::INFINITY;
         }
-        ((1.0 - self.share) / 2.0 * self.square).min(1.0) * self.side() * self.skew()
+        // Beyond a grid's outermost tags there are squares as wide as a gap, too.
+        ((1.0 - self.share) / 2.0).min(1.0 / self.square) * self.square_height_px()
+    }
+
+    /// The least height of the squares with markers over the edges that meet at the corner, px. At a grid's border an edge is as long as a tag
+    /// one way and as a gap the other, and what is short in the picture may be either.
+    fn square_height_px(&self) -> f64 {
+        let height = |marked: &Marked| {
+            let at = (0..4).min_by(|a, b| marked.0[*a].norm().total_cmp(&marked.0[*b].norm())).unwrap_or(0);
+            let [a, b] = [1, 3].map(|next| marked.0[(at + next) % 4] - marked.0[at]);
+            (a.x * b.y - a.y * b.x).abs() / a.norm().max(b.norm())
+        };
+        self.marked.iter().flatten().map(height).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether a first fit, whose window leaves out what a sharp picture shows of the markers, is more than a start. Two markers that lie opposite each
@@ -112,7 +124,7 @@ impl Cell {
     /// The markers beside the corner, larger by a halo, px.
     pub(super) fn hidden_by(&self, halo_px: f64) -> [Option<Quad>; 2] {
         // What an edge's own blur shows of a marker is nothing where it begins within the halo.
-        let near = ((1.0 - self.share) / 2.0 - halo_px / (self.square * self.side() * self.skew())).max(0.0);
+        let near = ((1.0 - self.share) / 2.0 - halo_px / self.square_height_px()).max(0.0);
         self.marked.map(|marked| {
             let corners = marked?.0.map(Point2::from);
             let map = square_map(&corners)?;
@@ -135,5 +147,38 @@ impl Cell {
     pub(super) fn skew(&self) -> f64 {
         let [a, b] = self.edges;
         (a.x * b.y - a.y * b.x).abs() / (a.norm() * b.norm())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::board::{Layout, Pitch};
+    use crate::imaging::lattice::Lattice;
+
+    /// A grid of tags of 40 px, their gaps a share of it, seen so obliquely that its columns are as short as this.
+    fn margin_px(gap: f64, foreshortened: f64, at: (usize, usize)) -> f64 {
+        let pitch = Pitch::Tags { gap };
+        let x = |line: usize| 40.0 * pitch.at(line as isize);
+        let places: Places = Lattice::from_fn(12, 8, |c, r| Some(Point2::new(x(c), foreshortened * x(r))));
+        // Two of eight fields are border.
+        let print = Print { share: 0.5, pitch, layout: Layout::Tags, inverted: false };
+        let cell = Cell::of(&places, at.0, at.1).map(|cell| cell.with_markers(&places, at, Some(print)));
+        cell.map_or(f64::NAN, |cell| cell.margin_px())
+    }
+
+    #[test]
+    fn a_tags_border_is_as_narrow_as_it_is_seen_at_the_grids_border_too() {
+        for foreshortened in [1.0, 0.7, 0.5, 0.35] {
+            for at in [(0, 0), (3, 0), (0, 3), (11, 4), (5, 7), (4, 3)] {
+                let margin = margin_px(0.4, foreshortened, at);
+                assert!((margin - 10.0 * foreshortened).abs() < 1e-9, "{foreshortened} {at:?}: {margin}");
+            }
+            // Where gaps are narrower than the tags' borders they are what is next.
+            for at in [(0, 0), (4, 3)] {
+                let margin = margin_px(0.2, foreshortened, at);
+                assert!((margin - 8.0 * foreshortened).abs() < 1e-9, "{foreshortened} {at:?}: {margin}");
+            }
+        }
     }
 }
