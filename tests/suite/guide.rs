@@ -1,7 +1,7 @@
 //! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder. Those of the page `day` are
 //! the run that the READMEs show.
 
-use std::collections::HashSet;
+use std::collections::BTreeSet;
 
 use stereocal::guide::PAGES;
 
@@ -42,7 +42,7 @@ fn files(text: &str) -> Vec<(&str, String)> {
 #[test]
 fn every_command_of_the_guide_does_what_it_says() {
     let folder = workplace();
-    let (mut done, mut run) = (HashSet::new(), Vec::new());
+    let (mut done, mut run) = (BTreeSet::new(), Vec::new());
     for page in PAGES {
         for (name, text) in files(page.text) {
             std::fs::write(folder.path().join(name), text).unwrap();
