@@ -11,7 +11,7 @@ const BY_KEY: [(&str, &str); 9] = [
     ("target_shape", "a summary of measurements (measure.json)"),
     ("noise_mm", "a plan (plan.json)"),
     ("motions", "a compensation (compensate.json)"),
-    ("left_projection", "a rectification (rectified.json)"),
+    ("P1", "a rectification (rectified.json)"),
     ("provenance", "another result of stereocal"),
 ];
 
@@ -39,6 +39,7 @@ mod tests {
     fn files_are_told_by_what_stands_in_them() {
         for (text, is) in [
             ("{\"groups\": [], \"flange_from_target\": null}", Some("a placement (placement.json)")),
+            ("{\"mode\": \"undistort\", \"P1\": []}", Some("a rectification (rectified.json)")),
             ("{\"version\": 1}", None),
             ("{\"flange_from_target\"", None),
             ("\u{feff}pose,group,role,j1_deg\n1,a,sample,0\n", Some("a table")),

@@ -126,10 +126,10 @@ fn unmodelled_effects_treat_all_methods_alike() {
             .collect();
     };
     let mut sums = [0.0; 3];
-    for seed in 0..4 {
+    for seed in 0..2 {
         let world = synthetic::planned(262, 50, 0.0, NOISE_MM, 100 + seed, &spoil);
         for (sum, method) in sums.iter_mut().zip([Method::Stapso, Method::TrustRegion, Method::Pso]) {
-            *sum += mean_errors(&world, method, seed).1 / 4.0;
+            *sum += mean_errors(&world, method, seed).1 / 2.0;
         }
     }
     // Solvers that reach one minimum differ by what their stopping leaves.
@@ -155,7 +155,7 @@ fn any_number_of_threads_gives_the_same_bytes() {
 fn truth_is_recovered_within_the_predicted_sigmas() {
     // Without the prior, so that sigma is the data's alone; base parameters of a truth whose other parameters are nominal.
     let (mut inside, mut total) = (0, 0);
-    for seed in 0..20 {
+    for seed in 0..12 {
         let world = synthetic::planned(60, 0, 25.0, NOISE_MM, 40 + seed, &|truth| {
             let mut plain = Robot::paper();
             plain.tool_mm = truth.tool_mm;
@@ -177,7 +177,7 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
             inside += usize::from((x - deviation).abs() < 2.0 * sigma);
         }
     }
-    // 95 % of normal deviations lie within two sigmas. The 19 of a seed are correlated; the 20 seeds are not.
+    // 95 % of normal deviations lie within two sigmas. The 19 of a seed are correlated; the 12 seeds are not.
     assert!(inside * 100 >= 90 * total, "{inside} of {total}");
 }
 
@@ -325,7 +325,7 @@ fn orientations_without_noise_make_no_scale() {
 fn points_without_noise_give_the_true_robot_whatever_covariances_they_state() {
     let world = synthetic::world(60, 0.0, 8);
     // None; and such that the data outweigh the tolerances by more than double precision holds.
-    for stated_mm in [0.0, 1e-4, 0.002, 0.1] {
+    for stated_mm in [0.0, 1e-4, 0.1] {
         let mut rows = world.rows.clone();
         let covariance = Matrix3::from_diagonal_element(stated_mm * stated_mm);
         synthetic::state(&mut rows, |_| (stated_mm > 0.0).then_some(covariance));

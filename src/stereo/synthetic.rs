@@ -139,17 +139,20 @@ impl World {
 
     /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.
     pub fn corners_by_hand(&self, seed: u64, turn_deg: f64) -> Corners {
-        let mut all = self.corners(seed);
         let mut draws = Draws::new(seed, Purpose::Points, 17);
-        for i in 0..all.pairs.len() {
+        self.corners_by(seed, || {
             let turn = Vector3::from_fn(|_, _| draws.normal()) * turn_deg.to_radians();
-            all.pairs[i] = self.with_camera_moved(turn, Vector3::zeros()).corners(seed).pairs[i].clone();
-        }
-        all
+            self.with_camera_moved(turn, Vector3::zeros()).rig
+        })
     }
 
     /// The corners as the cameras see them, with noise; corners outside of a picture are missing.
     pub fn corners(&self, seed: u64) -> Corners {
+        self.corners_by(seed, || self.rig.clone())
+    }
+
+    /// The same where the next pair's rig is asked for pair by pair.
+    fn corners_by(&self, seed: u64, mut rig: impl FnMut() -> Rig) -> Corners {
         let mut draws = Draws::new(seed, Purpose::Points, 0);
         let pairs = self
             .poses
@@ -157,11 +160,12 @@ impl World {
             .enumerate()
             .map(|(i, pose)| {
                 let mut pair = PairCorners { pair: format!("{i:02}"), ..PairCorners::default() };
+                let rig = rig();
                 for row in 0..self.board.rows() {
                     for col in 0..self.board.columns() {
-                        let (left, right) = self.rig.project(&(pose * self.corner_mm(col, row)));
+                        let (left, right) = rig.project(&(pose * self.corner_mm(col, row)));
                         for (list, px, camera) in
-                            [(&mut pair.left, left, &self.rig.left), (&mut pair.right, right, &self.rig.right)]
+                            [(&mut pair.left, left, &rig.left), (&mut pair.right, right, &rig.right)]
                         {
                             let px: Point2<f64> = px + Vector2::new(draws.normal(), draws.normal()) * self.sigma_px;
                             if px.x > 0.0

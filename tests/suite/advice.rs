@@ -1,14 +1,20 @@
 //! What a run's own words advise against is said by every command that uses its files: a robot that `identify` said not to use.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use stereocal::formats::calibration::CalibrationFile;
 use stereocal::simulate::rig::true_rig;
 
-use crate::run::{stderr, stdout, stereocal, workplace};
+use crate::run::{Files, files_below, stderr, stdout, stereocal, with_files, workplace};
 
 /// A robot with points of 52 poses, identified into `out` as it is, or with a file of another arm.
 fn identified(robot: &str) -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| files_below(made("robot.toml").path()));
+    if robot == "robot.toml" { with_files(&MADE) } else { made(robot) }
+}
+
+fn made(robot: &str) -> tempfile::TempDir {
     let folder = workplace();
     let at = folder.path();
     let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];

@@ -1,10 +1,11 @@
 //! Daily use: lenses that are known from another day or program, and whether a calibration still holds.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use crate::run::{stderr, stdout, stereocal, workplace};
+use crate::run::{Files, files_below, stderr, stdout, stereocal, with_files, workplace};
 
 /// Shifts the right pictures' corners of a `corners.csv` along x by what a turn of the right camera by so many rad does to them, to first order.
 fn turned(folder: &Path, from: &str, to: &str, focal_px: f64, rad: f64) {
@@ -32,6 +33,11 @@ fn json(path: &Path) -> Value {
 
 /// Eight pairs, calibrated into `out`, and the corners of some of them in files of their own.
 fn calibrated() -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| files_below(made().path()));
+    with_files(&MADE)
+}
+
+fn made() -> tempfile::TempDir {
     let folder = workplace();
     let at = folder.path();
     let few = ["--check-pairs", "8", "--samples", "0", "--verify", "0", "--seed", "3"];

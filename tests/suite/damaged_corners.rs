@@ -229,9 +229,10 @@ struct Outcome {
     rms_px: f64,
 }
 
-fn outcome(kind: &Kind) -> Outcome {
+fn outcome(kind: &Kind, first: usize) -> Outcome {
     let (mut all, mut refused, mut corners) = (Vec::<Deviations>::new(), Vec::new(), 0);
-    for (k, setup) in setups().into_iter().enumerate() {
+    // Every other of them, the others of the next kind.
+    for (k, setup) in setups().into_iter().enumerate().skip(first % 2).step_by(2) {
         let seed = k as u64 + 1;
         let shot = named((kind.setup)(setup, seed).take());
         let picture = (kind.picture)(&shot, seed);
@@ -265,12 +266,12 @@ fn least_chi2(kind: &Kind) -> f64 {
 #[test]
 fn damaged_pictures_give_nearly_all_corners_with_true_covariances() {
     let mut short = Vec::new();
-    for kind in kinds() {
-        let Outcome { refused, share, chi2, most_sigmas, rms_px } = outcome(&kind);
+    for (first, kind) in kinds().into_iter().enumerate() {
+        let Outcome { refused, share, chi2, most_sigmas, rms_px } = outcome(&kind, first);
         let line = format!(
-            "{:24} read {:2} of 12, corners {:5.1} %, chi-squared {chi2:5.2}, largest {most_sigmas:5.1} sigmas, {rms_px:.4} px",
+            "{:24} read {:2} of 6, corners {:5.1} %, chi-squared {chi2:5.2}, largest {most_sigmas:5.1} sigmas, {rms_px:.4} px",
             kind.name,
-            12 - refused.len(),
+            6 - refused.len(),
             100.0 * share
         );
         println!("{line}");
@@ -292,7 +293,7 @@ fn a_board_that_is_larger_is_refused_with_its_size() {
         for (way, covers) in covers.into_iter().enumerate() {
             let shot = Setup { squares: "10x8", covers, ..setup.clone() }.take();
             let picture = shot.eight().into();
-            for squares in ["9x7", "10x7", "9x8", "8x6"] {
+            for squares in [["9x7", "8x6"], ["10x7", "9x8"]][(k + way) % 2] {
                 let board = Board::checker(squares.parse().unwrap(), SQUARE_MM);
                 let refusal = corners_in(&picture, board).expect_err(squares);
                 named_right += usize::from(refusal.seen == Some(shot.board));
@@ -302,5 +303,5 @@ fn a_board_that_is_larger_is_refused_with_its_size() {
         }
     }
     // Fingers over its corners leave some boards without a size.
-    assert!(named_right >= 2 * 12 * 4 + 12, "{named_right}");
+    assert!(named_right >= 2 * 12 * 2 + 6, "{named_right}");
 }

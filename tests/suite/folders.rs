@@ -15,7 +15,8 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 fn world() -> tempfile::TempDir {
     let folder = workplace();
     let root = folder.path();
-    done(root, &["simulate", "--preset", "small", "--check-pairs", "10", "--out", "world"]);
+    let pairs = ["--check-pairs", "8", "--samples", "0", "--verify", "0"];
+    done(root, &[&["simulate", "--preset", "small", "--size", "640", "--out", "world"], &pairs[..]].concat());
     for name in ["cams/cam1", "cams/cam2", "wide", "high"] {
         std::fs::create_dir_all(root.join(name)).unwrap();
     }
@@ -47,24 +48,24 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
         (std::fs::read(root.join(out).join("calibration.json")).unwrap(), said)
     };
     let (plain, said) = check(&["world/check"], "plain");
-    assert!(said.contains("10 pairs by name: left left/*.png, right right/*.png"), "{said}");
+    assert!(said.contains("8 pairs by name: left left/*.png, right right/*.png"), "{said}");
     let (cams, said) = check(&["cams"], "cams_out");
-    assert!(said.contains("10 pairs by number: left cam1/b*.png, right cam2/a*.png; no word tells"), "{said}");
+    assert!(said.contains("8 pairs by number: left cam1/b*.png, right cam2/a*.png; no word tells"), "{said}");
     assert!(cams == plain);
     // What was read is named as the input, wherever it lies below the folder.
     done(root, &["camera-check", "cams", "--out", "cams_out"]);
     let written = std::fs::read_to_string(root.join("cams_out/camera-check.json")).unwrap();
-    assert!(written.contains("\"pictures\": 20"), "{written}");
+    assert!(written.contains("\"pictures\": 16"), "{written}");
     let (given, _) = check(&["cams/cam1", "cams/cam2"], "given");
     assert!(given == plain);
     let (ordered, said) = check(&["cams", "--pair-by", "order"], "ordered");
-    assert!(said.contains("10 pairs by order"), "{said}");
+    assert!(said.contains("8 pairs by order"), "{said}");
     assert!(ordered == plain);
     let (halves, said) = check(&["wide", "--side-by-side"], "halves");
-    assert!(said.contains("10 pairs: the left and the right half of each picture in wide"), "{said}");
+    assert!(said.contains("8 pairs: the left and the right half of each picture in wide"), "{said}");
     assert!(halves == plain);
     let (halves, said) = check(&["high", "--top-bottom"], "halves");
-    assert!(said.contains("10 pairs: the upper and the lower half of each picture in high"), "{said}");
+    assert!(said.contains("8 pairs: the upper and the lower half of each picture in high"), "{said}");
     assert!(halves == plain);
     // Neither can be told from the names; the form of the pictures says which flag may be meant.
     for (name, flag) in [
@@ -83,7 +84,8 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
 fn measure_finds_the_poses_beside_two_folders() {
     let folder = workplace();
     let root = folder.path();
-    done(root, &["simulate", "--preset", "small", "--check-pairs", "0", "--out", "world"]);
+    let poses = ["--check-pairs", "0", "--samples", "12", "--verify", "0"];
+    done(root, &[&["simulate", "--preset", "small", "--size", "640", "--out", "world"], &poses[..]].concat());
     let measure = |arguments: &[&str], out: &str| {
         let with = ["--calibration", "world/truth/calibration.json", "--no-provenance", "--out", out];
         done(root, &[&["measure"], arguments, &with].concat());

@@ -1,22 +1,29 @@
 //! `measure` as its users meet it: what it says of a rig or a target that is another, of bad poses, and of pictures that arrive late.
 
 use std::path::Path;
+use std::sync::LazyLock;
 use std::time::Duration;
 
 use predicates::prelude::*;
 use serde_json::Value;
 
-use crate::run::{stderr, stereocal, workplace};
+use crate::run::{Files, files_below, stderr, stereocal, with_files, workplace};
 
 /// A small world, calibrated.
-fn calibrated(folder: &Path, seed: &str) {
-    let world =
-        ["simulate", "--preset", "small", "--size", "640", "--samples", "12", "--verify", "0", "--check-pairs", "10"];
-    let made = stereocal(folder, &[&world[..], &["--seed", seed, "--out", "."]].concat());
-    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
-    // What so few pairs allow to say of the rig is not the matter here.
-    stereocal(folder, &["camera-check", "check/", "--lens", "brown4", "--tolerance-mm", "0.5"]);
-    assert!(folder.join("out/calibration.json").is_file());
+fn calibrated() -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| {
+        let folder = workplace();
+        let at = folder.path();
+        let world = ["simulate", "--preset", "small", "--size", "640", "--seed", "3", "--out", "."];
+        let few = ["--samples", "12", "--verify", "0", "--check-pairs", "10"];
+        let made = stereocal(at, &[&world[..], &few].concat());
+        assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+        // What so few pairs allow to say of the rig is not the matter here.
+        stereocal(at, &["camera-check", "check/", "--lens", "brown4", "--tolerance-mm", "0.5"]);
+        assert!(at.join("out/calibration.json").is_file());
+        files_below(at)
+    });
+    with_files(&MADE)
 }
 
 fn json(path: &Path) -> Value {
@@ -34,9 +41,8 @@ fn column(path: &Path, name: &str) -> Vec<String> {
 
 #[test]
 fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
-    let folder = workplace();
+    let folder = calibrated();
     let world = folder.path();
-    calibrated(world, "3");
     let good = stereocal(world, &["measure", "poses/"]);
     assert_eq!(good.status.code(), Some(0), "{}", stderr(&good));
     assert!(!stderr(&good).contains("warning"), "{}", stderr(&good));
@@ -81,9 +87,8 @@ fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
 
 #[test]
 fn names_that_a_spreadsheet_took_zeros_from_find_their_pictures() {
-    let folder = workplace();
+    let folder = calibrated();
     let world = folder.path();
-    calibrated(world, "3");
     assert_eq!(stereocal(world, &["measure", "poses/"]).status.code(), Some(0));
     let list = world.join("poses/poses.csv");
     let names = column(&list, "pose");
@@ -119,9 +124,8 @@ fn names_that_a_spreadsheet_took_zeros_from_find_their_pictures() {
 
 #[test]
 fn poses_beyond_the_depth_of_the_boards_are_named() {
-    let folder = workplace();
+    let folder = calibrated();
     let world = folder.path();
-    calibrated(world, "4");
     let path = world.join("out/calibration.json");
     let rig: Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
     let depth = |end: usize| rig.pointer(&format!("/volume/depth_mm/{end}")).and_then(Value::as_f64).unwrap();
@@ -143,9 +147,8 @@ fn poses_beyond_the_depth_of_the_boards_are_named() {
 
 #[test]
 fn pictures_that_arrive_late_give_the_same_bytes() {
-    let folder = workplace();
+    let folder = calibrated();
     let world = folder.path().to_owned();
-    calibrated(&world, "4");
     let late = world.join("late");
     for side in ["left", "right"] {
         std::fs::create_dir_all(late.join(side)).unwrap();

@@ -1,14 +1,20 @@
 //! Tables that are not what they seem to be, judged by a robot that is known: what is said of them, with which figures and which status.
 
 use std::path::Path;
+use std::sync::LazyLock;
 
 use camino::Utf8Path;
 use stereocal::robot::{Robot, file};
 
-use crate::run::{stderr, stdout, stereocal, workplace};
+use crate::run::{Files, files_below, stderr, stdout, stereocal, with_files, workplace};
 
 /// A robot with points of 60 poses, identified into `out`.
 fn identified() -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| files_below(made().path()));
+    with_files(&MADE)
+}
+
+fn made() -> tempfile::TempDir {
     let folder = workplace();
     let at = folder.path();
     let made = ["simulate", "--points-only", "--samples", "48", "--verify", "12", "--seed", "7", "--out", "."];

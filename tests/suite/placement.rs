@@ -1,13 +1,19 @@
 //! Where the cameras stand: what `identify` and `locate` write of it, and what readers of other programs make of the exports.
 
 use std::process::Command;
+use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use crate::run::{stderr, stdout, stereocal, workplace};
+use crate::run::{Files, files_below, stderr, stdout, stereocal, with_files, workplace};
 
 /// A robot with points of 30 poses in two groups, identified into `out`.
 fn identified() -> tempfile::TempDir {
+    static MADE: LazyLock<Files> = LazyLock::new(|| files_below(made().path()));
+    with_files(&MADE)
+}
+
+fn made() -> tempfile::TempDir {
     let folder = workplace();
     let at = folder.path();
     let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];

@@ -68,7 +68,15 @@ fn a_robot_measured_by_a_laser_tracker() {
     let path = |name: &str| robot.join(name).to_str().unwrap().to_owned();
     let output = stereocal(
         folder.path(),
-        &["identify", "--measurements", &path("measurements.csv"), "--robot", &path("robot.toml")],
+        &[
+            "identify",
+            "--method",
+            "trust-region",
+            "--measurements",
+            &path("measurements.csv"),
+            "--robot",
+            &path("robot.toml"),
+        ],
     );
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let found = json(folder.path(), "identification.json");

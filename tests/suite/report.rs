@@ -15,7 +15,7 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
     let folder = workplace();
     let world = folder.path();
     let simulate =
-        ["simulate", "--preset", "small", "--size", "960", "--check-pairs", "10", "--samples", "4", "--out", "."];
+        ["simulate", "--preset", "small", "--size", "800", "--check-pairs", "10", "--samples", "0", "--out", "."];
     done(world, &[&simulate[..], &["--verify", "0"]].concat());
     let page_of = |board: &str, out: &str| {
         let output = stereocal(world, &["camera-check", "check/", "--board", board, "--out", out]);

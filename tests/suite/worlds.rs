@@ -10,28 +10,13 @@ use stereocal::simulate::settings::Settings;
 use stereocal::simulate::truth_files;
 use stereocal::simulate::world::World;
 
+use crate::run::{Files, files_below};
+
 fn tiny() -> Settings {
     Settings { size_px: 320, check_pairs: 2, samples: 4, verify: 4, ..Settings::small() }
 }
 
-fn files_below(folder: &Utf8Path) -> Vec<(String, Vec<u8>)> {
-    let mut found = Vec::new();
-    let mut folders = vec![folder.to_owned()];
-    while let Some(next) = folders.pop() {
-        for entry in next.read_dir_utf8().unwrap() {
-            let path = entry.unwrap().path().to_owned();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                found.push((path.strip_prefix(folder).unwrap().to_string(), std::fs::read(&path).unwrap()));
-            }
-        }
-    }
-    found.sort();
-    found
-}
-
-fn written(settings: Settings, threads: usize) -> (tempfile::TempDir, Vec<(String, Vec<u8>)>) {
+fn written(settings: Settings, threads: usize) -> (tempfile::TempDir, Files) {
     let folder = tempfile::tempdir().unwrap();
     let path = Utf8Path::from_path(folder.path()).unwrap().to_owned();
     let world = World::new(settings, None).unwrap();
@@ -41,7 +26,7 @@ fn written(settings: Settings, threads: usize) -> (tempfile::TempDir, Vec<(Strin
     pool.install(|| world.write_pictures(&out)).unwrap();
     // The list of what was written is in order once the folder is closed.
     drop(out);
-    let files = files_below(&path);
+    let files = files_below(path.as_std_path());
     (folder, files)
 }
 

@@ -59,15 +59,17 @@ const TURNS: [[f64; 3]; 3] = [[-0.5, 0.5, 0.2], [0.0, 0.0, 0.0], [0.7, -0.4, 1.1
 #[test]
 fn a_board_cut_by_borders_has_no_wrong_number() {
     let mut tally = Tally::default();
-    for board in BOARDS {
+    for (first, board) in BOARDS.into_iter().enumerate() {
         let places = [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0), (70.0, 0.0), (-40.0, 45.0)];
-        for (k, ((x, y), turn)) in places.into_iter().flat_map(|place| TURNS.map(|turn| (place, turn))).enumerate() {
-            let z = [250.0, 420.0][k % 2];
+        // Each place with one of the turns, another one for the next board.
+        let turns = TURNS.into_iter().cycle().skip(first);
+        for (k, ((x, y), turn)) in places.into_iter().zip(turns).enumerate() {
+            let z = [250.0, 420.0][(k + first) % 2];
             let (picture, truth) = Shot::of(board, turn, [x * z / 420.0, y * z / 420.0, z]).taken();
             look(&board.parse().unwrap(), &picture, &truth, &format!("{board} {x} {y} {z} {turn:?}"), &mut tally);
         }
     }
-    assert!(tally.numbered > 10 && tally.open > 10, "{tally:?}");
+    assert!(tally.numbered > 3 && tally.open > 3, "{tally:?}");
 }
 
 #[test]
@@ -81,22 +83,20 @@ fn a_board_behind_a_hand_has_no_wrong_number() {
             let board: Board = board.parse().unwrap();
             let (first, last) = (truth[0], truth[board.index(board.columns() - 1, board.rows() - 1)]);
             for (share, grey) in [(0.25, 90), (0.5, 190)] {
-                // From the first corner's side or from the last one's, along the columns or aslant.
-                for along in [truth[board.columns() - 1] - first, last - first] {
-                    for ahead in [true, false] {
-                        let hidden = with_pixels(&picture, |image, x, y| {
-                            let at = (Point2::new(x as f64, y as f64) - first).dot(&along) / along.norm_squared();
-                            let covers = if ahead { at < share } else { at > 1.0 - share };
-                            if covers { grey } else { image.pixels[y * image.width + x] }
-                        });
-                        let what = format!("{board} {k} {x} {share} {grey} {along} {ahead}");
-                        look(&board, &hidden, &truth, &what, &mut tally);
-                    }
+                // From the first corner's side along the columns, or from the last one's aslant.
+                for (along, ahead) in [(truth[board.columns() - 1] - first, true), (last - first, false)] {
+                    let hidden = with_pixels(&picture, |image, x, y| {
+                        let at = (Point2::new(x as f64, y as f64) - first).dot(&along) / along.norm_squared();
+                        let covers = if ahead { at < share } else { at > 1.0 - share };
+                        if covers { grey } else { image.pixels[y * image.width + x] }
+                    });
+                    let what = format!("{board} {k} {x} {share} {grey} {along} {ahead}");
+                    look(&board, &hidden, &truth, &what, &mut tally);
                 }
             }
         }
     }
-    assert!(tally.open > 10, "{tally:?}");
+    assert!(tally.open > 5, "{tally:?}");
 }
 
 #[test]

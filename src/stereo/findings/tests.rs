@@ -20,6 +20,11 @@ fn worlds(pairs: usize, seed: u64) -> [World; 2] {
     [World::paper(pairs, seed), small]
 }
 
+/// One of them for the case of this number.
+fn one_of(case: usize, pairs: usize, seed: u64) -> World {
+    worlds(pairs, seed)[case % 2].clone()
+}
+
 /// The pairs of `range` as another world shows them.
 fn planted(world: &World, seed: u64, range: impl Iterator<Item = usize>, change: impl Fn(&mut World)) -> Corners {
     let mut other = world.clone();
@@ -47,13 +52,11 @@ fn standing(corners: &Corners) -> (Calibration, Vec<Finding>) {
 
 #[test]
 fn a_clean_series_of_any_noise_loses_nothing() {
-    for (sigma_px, seed) in [(0.002, 1), (0.02, 2), (0.3, 1), (1.0, 2)] {
-        for world in worlds(8 + 4 * seed as usize, seed) {
-            let world = World { sigma_px, ..world };
-            let (found, told) = calibrate_standing(&world.corners(seed), &asked(Options::default())).unwrap();
-            assert!(found.skipped.is_empty() && told.is_empty(), "{sigma_px} px: {:?} {told:?}", found.skipped);
-            assert_eq!((found.standing.since, found.standing.unconfirmed), (None, Vec::new()));
-        }
+    for (case, (sigma_px, seed)) in [(0.002, 1), (0.02, 2), (0.3, 1), (1.0, 2)].into_iter().enumerate() {
+        let world = World { sigma_px, ..one_of(case, 8 + 4 * seed as usize, seed) };
+        let (found, told) = calibrate_standing(&world.corners(seed), &asked(Options::default())).unwrap();
+        assert!(found.skipped.is_empty() && told.is_empty(), "{sigma_px} px: {:?} {told:?}", found.skipped);
+        assert_eq!((found.standing.since, found.standing.unconfirmed), (None, Vec::new()));
     }
 }
 
@@ -65,24 +68,23 @@ fn a_camera_that_moved_leaves_the_last_rig() {
         ("0.2 mm along z", Vector3::zeros(), Vector3::new(0.0, 0.0, 0.2)),
         ("0.05 deg", Vector3::new(0.0, 0.05_f64.to_radians(), 0.0), Vector3::zeros()),
     ];
-    for (what, turn, shift) in shifts {
-        for (w, world) in worlds(12, 3).into_iter().enumerate() {
-            let after = world.with_camera_moved(turn, shift);
-            let first = [6, 8][w];
-            let corners = shown_by(world.corners(4), &after, 4, first..12);
-            let (found, told) = standing(&corners);
-            let before: Vec<&str> = found.discarded.pairs.iter().map(|d| d.pair.as_str()).collect();
-            let expected: Vec<String> = (0..first).map(|i| format!("{i:02}")).collect();
-            assert_eq!(before, expected, "{what} before pair {first} in world {w}: {:?} {told:?}", found.skipped);
-            let named = ["yaw", "baseline", "camera-moved"].iter().any(|cause| told[0].cause.contains(cause));
-            assert!(named && told.len() == 1, "{what}: {told:?}");
-            assert_eq!(found.standing.since, Some(format!("{first:02}")));
-            let off = found.rig().right_from_left.translation.vector - after.rig.right_from_left.translation.vector;
-            assert!(off.norm() < 0.15, "{what}: {off}");
-            // Too few pairs of the rig that stands: said, and the rig of the others is no longer confirmed.
-            let (found, told) = standing(&shown_by(world.corners(4), &after, 4, 10..12));
-            assert_eq!(found.standing.unconfirmed, ["10", "11"], "{what} in world {w}: {:?} {told:?}", found.skipped);
-        }
+    for (case, (what, turn, shift)) in shifts.into_iter().enumerate() {
+        let world = one_of(case, 12, 3);
+        let after = world.with_camera_moved(turn, shift);
+        let first = [6, 8][case % 2];
+        let corners = shown_by(world.corners(4), &after, 4, first..12);
+        let (found, told) = standing(&corners);
+        let before: Vec<&str> = found.discarded.pairs.iter().map(|d| d.pair.as_str()).collect();
+        let expected: Vec<String> = (0..first).map(|i| format!("{i:02}")).collect();
+        assert_eq!(before, expected, "{what} before pair {first}: {:?} {told:?}", found.skipped);
+        let named = ["yaw", "baseline", "camera-moved"].iter().any(|cause| told[0].cause.contains(cause));
+        assert!(named && told.len() == 1, "{what}: {told:?}");
+        assert_eq!(found.standing.since, Some(format!("{first:02}")));
+        let off = found.rig().right_from_left.translation.vector - after.rig.right_from_left.translation.vector;
+        assert!(off.norm() < 0.15, "{what}: {off}");
+        // Too few pairs of the rig that stands: said, and the rig of the others is no longer confirmed.
+        let (found, told) = standing(&shown_by(world.corners(4), &after, 4, 10..12));
+        assert_eq!(found.standing.unconfirmed, ["10", "11"], "{what}: {:?} {told:?}", found.skipped);
     }
 }
 
@@ -127,72 +129,63 @@ fn two_pairs_out_of_step() {
 
 #[test]
 fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
-    for size_deg in [0.01_f64, 0.05] {
-        for (w, world) in worlds(12, 21).into_iter().enumerate() {
-            let turned =
-                |share: f64| world.with_camera_moved(Vector3::y() * size_deg.to_radians() * share, Vector3::zeros());
-            let mut corners = world.corners(22);
-            for i in 0..12 {
-                corners = shown_by(corners, &turned(i as f64 / 11.0), 22, i..=i);
-            }
-            let (found, told) = standing(&corners);
-            let causes: Vec<&str> = told.iter().map(|finding| finding.cause.as_str()).collect();
-            assert!(causes.len() == 1 && causes[0].contains("yaw"), "{size_deg} deg in world {w}: {causes:?}");
-            assert!(found.skipped.is_empty() && found.since_moment.len() == 1, "{:?}", found.skipped);
-            assert_eq!(found.moment(), ["05", "06"]);
-            let off = (found.rig().right_from_left.rotation * turned(0.5).rig.right_from_left.rotation.inverse())
-                .scaled_axis()
-                .y;
-            let at = found.layout.transform_start() + 1;
-            let sigma = found.uncertainty.shared[(at, at)].sqrt();
-            let limit = 4.0 * sigma;
-            assert!(off.abs() < limit, "{size_deg} deg in world {w}: {off} against {limit}");
-            let since = found.since_moment[0][at];
-            assert!((since - 0.5 * size_deg.to_radians()).abs() < limit, "{since} against {limit}");
-            // What drifted is known, and counts as no scatter of the pairs; of a board that may have grown it is not known where it began.
-            let still = standing(&world.corners(22)).0.uncertainty.shared[(at, at)].sqrt();
-            let other_board = causes[0].contains("other-board");
-            assert!(other_board || sigma < 1.6 * still, "{size_deg} deg in world {w}: {sigma} against {still}");
+    for (w, size_deg) in [0.01_f64, 0.05].into_iter().enumerate() {
+        let world = one_of(w, 12, 21);
+        let turned =
+            |share: f64| world.with_camera_moved(Vector3::y() * size_deg.to_radians() * share, Vector3::zeros());
+        let mut corners = world.corners(22);
+        for i in 0..12 {
+            corners = shown_by(corners, &turned(i as f64 / 11.0), 22, i..=i);
         }
+        let (found, told) = standing(&corners);
+        let causes: Vec<&str> = told.iter().map(|finding| finding.cause.as_str()).collect();
+        assert!(causes.len() == 1 && causes[0].contains("yaw"), "{size_deg} deg in world {w}: {causes:?}");
+        assert!(found.skipped.is_empty() && found.since_moment.len() == 1, "{:?}", found.skipped);
+        assert_eq!(found.moment(), ["05", "06"]);
+        let off =
+            (found.rig().right_from_left.rotation * turned(0.5).rig.right_from_left.rotation.inverse()).scaled_axis().y;
+        let at = found.layout.transform_start() + 1;
+        let sigma = found.uncertainty.shared[(at, at)].sqrt();
+        let limit = 4.0 * sigma;
+        assert!(off.abs() < limit, "{size_deg} deg in world {w}: {off} against {limit}");
+        let since = found.since_moment[0][at];
+        assert!((since - 0.5 * size_deg.to_radians()).abs() < limit, "{since} against {limit}");
+        // What drifted is known, and counts as no scatter of the pairs; of a board that may have grown it is not known where it began.
+        let still = standing(&world.corners(22)).0.uncertainty.shared[(at, at)].sqrt();
+        let other_board = causes[0].contains("other-board");
+        assert!(other_board || sigma < 1.6 * still, "{size_deg} deg in world {w}: {sigma} against {still}");
     }
 }
 
 #[test]
 fn a_focus_that_drifts_is_nothing_that_moved_between_two_pictures() {
-    for share in [5e-4, 2e-3] {
-        for (w, world) in worlds(12, 31).into_iter().enumerate() {
-            let mut corners = world.corners(32);
-            for i in 0..12 {
-                let mut after = world.clone();
-                let right = &mut after.rig.right;
-                let focus = 1.0 + share * i as f64 / 11.0;
-                (right.fx, right.fy) = (right.fx * focus, right.fy * focus);
-                corners = shown_by(corners, &after, 32, i..=i);
-            }
-            let (found, told) = standing(&corners);
-            let [drift] = told.as_slice() else { panic!("{share} in world {w}: {told:?}") };
-            assert!(drift.cause.contains("focus") && drift.kind == Kind::Drift, "{share} in world {w}: {drift:?}");
-            assert!((drift.size.unwrap() / (100.0 * share) - 1.0).abs() < 0.25, "{share} in world {w}: {drift:?}");
-            assert!(!found.each_alone && found.skipped.is_empty(), "{share} in world {w}: {:?}", found.skipped);
+    for (w, share) in [5e-4, 2e-3].into_iter().enumerate() {
+        let world = one_of(w, 12, 31);
+        let mut corners = world.corners(32);
+        for i in 0..12 {
+            let mut after = world.clone();
+            let right = &mut after.rig.right;
+            let focus = 1.0 + share * i as f64 / 11.0;
+            (right.fx, right.fy) = (right.fx * focus, right.fy * focus);
+            corners = shown_by(corners, &after, 32, i..=i);
         }
+        let (found, told) = standing(&corners);
+        let [drift] = told.as_slice() else { panic!("{share} in world {w}: {told:?}") };
+        assert!(drift.cause.contains("focus") && drift.kind == Kind::Drift, "{share} in world {w}: {drift:?}");
+        assert!((drift.size.unwrap() / (100.0 * share) - 1.0).abs() < 0.25, "{share} in world {w}: {drift:?}");
+        assert!(!found.each_alone && found.skipped.is_empty(), "{share} in world {w}: {:?}", found.skipped);
     }
 }
 
 #[test]
 fn another_board_in_two_pairs() {
-    for percent in [0.1, 0.3, 1.0, 3.0] {
-        for (w, world) in worlds(12, 13).into_iter().enumerate() {
-            let corners =
-                planted(&world, 14, [3, 7].into_iter(), |other| other.board.square_mm *= 1.0 + percent / 100.0);
-            let (found, told) = standing(&corners);
-            assert_eq!(
-                causes(&found),
-                [("03", Cause::OtherBoard), ("07", Cause::OtherBoard)],
-                "{percent} % in world {w}: {:?}",
-                found.skipped
-            );
-            assert!(told.is_empty(), "{told:?}");
-        }
+    for (case, percent) in [0.1, 0.3, 1.0, 3.0].into_iter().enumerate() {
+        let world = one_of(case, 12, 13);
+        let corners = planted(&world, 14, [3, 7].into_iter(), |other| other.board.square_mm *= 1.0 + percent / 100.0);
+        let (found, told) = standing(&corners);
+        let expected = [("03", Cause::OtherBoard), ("07", Cause::OtherBoard)];
+        assert_eq!(causes(&found), expected, "{percent} %: {:?}", found.skipped);
+        assert!(told.is_empty(), "{told:?}");
     }
 }
 
@@ -245,31 +238,26 @@ fn small_noisy_pictures_fit_one_rig() {
 
 #[test]
 fn a_board_whose_squares_are_not_as_wide_as_high_as_was_said_is_named_by_its_ratio() {
-    for stretch in [0.004, -0.03] {
-        for world in worlds(12, 4) {
-            let mut corners = world.corners(4);
-            corners.board.square_mm *= 1.0 + stretch;
-            corners.board.stretch = 1.0 / (1.0 + stretch);
-            let (_, told) = calibrate_standing(&corners, &asked(Options::default())).unwrap();
-            let [finding] = told.as_slice() else { panic!("{stretch}: {told:?}") };
-            assert_eq!(finding.cause, "other-board", "{stretch}: {finding:?}");
-            let off = finding.size.unwrap() / 100.0 - (1.0 / (1.0 + stretch) - 1.0);
-            assert!(off.abs() < 1e-4, "{stretch}: {finding:?}");
-        }
+    for (case, stretch) in [0.004, -0.03].into_iter().enumerate() {
+        let mut corners = one_of(case, 12, 4).corners(4);
+        corners.board.square_mm *= 1.0 + stretch;
+        corners.board.stretch = 1.0 / (1.0 + stretch);
+        let (_, told) = calibrate_standing(&corners, &asked(Options::default())).unwrap();
+        let [finding] = told.as_slice() else { panic!("{stretch}: {told:?}") };
+        assert_eq!(finding.cause, "other-board", "{stretch}: {finding:?}");
+        let off = finding.size.unwrap() / 100.0 - (1.0 / (1.0 + stretch) - 1.0);
+        assert!(off.abs() < 1e-4, "{stretch}: {finding:?}");
     }
 }
 
 /// The pairs' first common rig is that of a flat board; what is said of all pairs is said of the rig that is stated.
 #[test]
 fn a_bowed_board_is_no_other_one() {
-    for bow_mm in [0.03, 0.1, 0.4] {
-        for mut world in worlds(12, 5) {
-            (world.bow_mm, world.sigma_px) = ([bow_mm, 0.5 * bow_mm], 0.002);
-            let corners = world.corners(5);
-            let (found, told) = calibrate_standing(&corners, &asked(Options::default())).unwrap();
-            assert!(found.values.shared.shape_mm.iter().any(|mm| mm.abs() > 0.2 * bow_mm), "{bow_mm}");
-            assert!(told.is_empty(), "{bow_mm}: {told:?}");
-        }
+    for (case, bow_mm) in [0.03, 0.1, 0.4].into_iter().enumerate() {
+        let world = World { bow_mm: [bow_mm, 0.5 * bow_mm], sigma_px: 0.002, ..one_of(case, 12, 5) };
+        let (found, told) = calibrate_standing(&world.corners(5), &asked(Options::default())).unwrap();
+        assert!(found.values.shared.shape_mm.iter().any(|mm| mm.abs() > 0.2 * bow_mm), "{bow_mm}");
+        assert!(told.is_empty(), "{bow_mm}: {told:?}");
     }
 }
 

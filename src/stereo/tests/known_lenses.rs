@@ -96,7 +96,7 @@ fn of_two_calibrations_each_gives_its_side() {
 /// Deviations of three pairs' focal lengths from the known ones in their standard deviations, mean square; and of the baseline from the truth in
 /// its own. With the scatter of the earlier pairs told, and without.
 fn by_hand(turn_deg: f64) -> [[f64; 2]; 2] {
-    const WORLDS: u64 = 8;
+    const WORLDS: u64 = 4;
     let mut squares = [[0.0; 2]; 2];
     for seed in 300..300 + WORLDS {
         let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
@@ -119,15 +119,10 @@ fn by_hand(turn_deg: f64) -> [[f64; 2]; 2] {
 
 #[test]
 fn three_pairs_that_scatter_do_not_pull_the_lenses_from_what_is_known_of_them() {
-    for turn_deg in [0.01, 0.03] {
-        let [[told, of_baseline], [alone, _]] = by_hand(turn_deg);
-        // What is known is known to one standard deviation; pairs that weigh by their corners' noise alone pull by many.
-        assert!(
-            told < 1.0 && told < 0.5 * alone,
-            "{turn_deg} deg: {told} where the scatter is told, {alone} where not"
-        );
-        assert!(of_baseline < 3.0, "{turn_deg} deg: {of_baseline}");
-    }
+    let [[told, of_baseline], [alone, _]] = by_hand(0.03);
+    // What is known is known to one standard deviation; pairs that weigh by their corners' noise alone pull by many.
+    assert!(told < 1.0 && told < 0.5 * alone, "{told} where the scatter is told, {alone} where not");
+    assert!(of_baseline < 3.0, "{of_baseline}");
     let [[clean, of_baseline], _] = by_hand(0.0);
     assert!(clean < 1.0 && of_baseline < 3.0, "{clean} {of_baseline}");
 }

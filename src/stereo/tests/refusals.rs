@@ -70,7 +70,7 @@ fn asked() -> Asked {
 #[test]
 fn a_series_that_is_shifted_against_the_other_side_is_named() {
     let world = World::new(10, 13);
-    for by in [1, 2, 8, 9] {
+    for by in [1, 8] {
         let corners = shifted(world.corners(14), by);
         match calibrate_standing(&corners, &asked()) {
             Err(Error::Shifted { fit, of, left, right }) => {
@@ -163,7 +163,7 @@ fn pictures_of_one_camera_are_no_rig() {
 fn boards_that_are_hardly_tilted_are_not_called_pictures_of_one_camera() {
     // The distance of these cameras is open because the focal lengths are; that of one camera's pictures is none.
     let mut lenses = 0;
-    for tilt in [0.01, 0.02, 0.03, 0.05, 0.08] {
+    for tilt in [0.01, 0.03, 0.08] {
         let world = World {
             sigma_px: 0.3,
             ..World::facing(8, |i| Vector3::new((1.7 * i).sin(), (2.9 * i).cos(), 0.1 * i) * tilt)
@@ -193,7 +193,7 @@ fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
 fn few_boards_that_lie_alike_are_calibrated_and_nothing_is_promised() {
     let all = ["00", "01", "02", "03", "04"];
     let mut unchecked = 0;
-    for sigma_px in [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0] {
+    for sigma_px in [0.25, 0.5, 1.0, 2.0] {
         let world = World::facing(5, |i| Vector3::new(0.02 * (i - 2.0), 0.03, 0.1 * i));
         let world = World { sigma_px, ..world };
         let Ok(found) = calibrate(&world.corners(1), &BROWN4) else { continue };

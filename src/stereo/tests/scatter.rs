@@ -4,12 +4,8 @@ use nalgebra::{DVector, Matrix2, Point2, Vector2};
 
 use super::*;
 use crate::simulate::draws::{Draws, Purpose};
-use crate::statistics::median;
-use crate::stereo::Lens;
 use crate::stereo::board_pose::pair_excess::pair_excess;
-use crate::stereo::data::View;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
-use crate::stereo::triangulate::{RigCovariance, common, triangulate};
 
 /// Noise as fits in windows of whole squares have it: across each edge, half of a corner's noise is that of the edge's other end.
 fn with_noise_of_shared_edges(exact: &Corners, sigma_px: f64, seed: u64) -> Corners {
@@ -50,7 +46,7 @@ fn with_noise_of_shared_edges(exact: &Corners, sigma_px: f64, seed: u64) -> Corn
 #[test]
 fn corners_that_share_edges_are_worth_less_and_no_fault() {
     let exact = World { sigma_px: 0.0, ..World::new(10, 5) };
-    let (mut squares, mut predicted, runs) = (0.0, 0.0, 30);
+    let (mut squares, mut predicted, runs) = (0.0, 0.0, 12);
     for run in 0..runs {
         let corners = with_noise_of_shared_edges(&exact.corners(0), 0.05, run);
         let found = calibrate(&corners, &BROWN4).unwrap();
@@ -65,121 +61,16 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
             predicted += 1.0;
         }
     }
-    // Without the allowance this ratio is near 0.7. 30 runs of correlated numbers know it to some 8 %.
+    // Without the allowance this ratio is near 0.7. 12 runs of correlated numbers know it to some 12 %; `cargo bench --bench calibration -- coverage` has
+    // each number's.
     let ratio = (predicted / squares).sqrt();
-    assert!((0.85..1.2).contains(&ratio), "predicted / true sigma {ratio:.3}");
+    assert!((0.82..1.25).contains(&ratio), "predicted / true sigma {ratio:.3}");
 }
 
 #[test]
 fn independent_corners_share_nothing() {
     let found = calibrate(&World::new(10, 5).corners(6), &BROWN4).unwrap();
     assert_eq!(found.neighbours.inflation(), 1.0);
-}
-
-/// Spread over calibrations of fresh noise against the predicted standard deviations.
-struct Spread {
-    /// The shared numbers' names, and predicted over true standard deviation of each.
-    names: Vec<String>,
-    ratios: Vec<f64>,
-    /// Share of the 95 % intervals that hold the truth.
-    inside: f64,
-    /// The same ratio for lengths of 70 mm on boards that calibrated nothing: in all, and the calibration's share alone.
-    lengths: f64,
-    lengths_by_calibration: f64,
-}
-
-fn monte_carlo(runs: u64, options: &Options) -> Spread {
-    let world = World::new(10, 5);
-    let (mut squares, mut predicted, mut inside, mut names) = (Vec::new(), Vec::new(), 0usize, Vec::new());
-    let (mut lengths, mut by_calibration) = (Ratio::default(), Ratio::default());
-    for run in 0..runs {
-        let found = calibrate(&world.corners(1000 + run), options).unwrap();
-        let off = deviations(&found, &world);
-        squares.resize(off.len(), 0.0);
-        predicted.resize(off.len(), 0.0);
-        for (i, off) in off.iter().enumerate() {
-            let variance = found.uncertainty.shared[(i, i)];
-            squares[i] += off * off;
-            predicted[i] += variance;
-            inside += usize::from(off.abs() <= 1.96 * variance.sqrt());
-        }
-        names = found.layout.names();
-        lengths_of_70_mm(&found, &world, 5000 + run, &mut lengths);
-        lengths_of_70_mm(&found, &World { sigma_px: 1e-9, ..world.clone() }, 0, &mut by_calibration);
-    }
-    let ratios = squares.iter().zip(&predicted).map(|(s, p): (&f64, &f64)| (p / s).sqrt()).collect::<Vec<f64>>();
-    let total = ratios.len() as f64 * runs as f64;
-    let inside = inside as f64 / total;
-    Spread { names, ratios, inside, lengths: lengths.root(), lengths_by_calibration: by_calibration.root() }
-}
-
-#[derive(Default)]
-struct Ratio {
-    predicted: f64,
-    squares: f64,
-}
-
-impl Ratio {
-    fn root(&self) -> f64 {
-        (self.predicted / self.squares).sqrt()
-    }
-}
-
-/// The four sides of a square of 70 mm in six poses, measured by a calibrated rig in corners as noisy as the world's.
-fn lengths_of_70_mm(calibration: &Calibration, world: &World, seed: u64, ratio: &mut Ratio) {
-    let board = crate::imaging::Board::checker("9x9".parse().unwrap(), 10.0);
-    let world = World { board, poses: World::new(6, 77).poses, ..world.clone() };
-    let covariance = RigCovariance::new(calibration.rig().covariance.as_ref().unwrap());
-    for pair in &world.corners(seed).pairs {
-        let mut view = View::new(&board, pair, 0);
-        // Each world's own noise: what the corners say of themselves.
-        for o in &mut view.observations {
-            o.whitener = nalgebra::Matrix2::identity() / world.sigma_px;
-        }
-        let seen = common(&view);
-        let point = |col: usize, row: usize| {
-            let (left, right) = seen.iter().find(|(l, _)| (l.col, l.row) == (col, row))?;
-            triangulate(calibration.rig(), left, right)
-        };
-        for (a, b) in [((0, 0), (7, 0)), ((0, 7), (7, 7)), ((0, 0), (0, 7)), ((7, 0), (7, 7))] {
-            let (Some(a), Some(b)) = (point(a.0, a.1), point(b.0, b.1)) else { continue };
-            let off = (b.point_mm - a.point_mm).norm() - 70.0;
-            ratio.squares += off * off;
-            ratio.predicted += a.corner_variance_mm2(&b) + covariance.length_variance_mm2(&a, &b);
-        }
-    }
-}
-
-/// Calibrations of a Monte Carlo; more where the environment says so, with the limits that so many allow.
-fn monte_carlo_runs() -> u64 {
-    std::env::var("STEREOCAL_MONTE_CARLO").ok().and_then(|n| n.parse().ok()).unwrap_or(40)
-}
-
-#[test]
-fn predicted_sigmas_are_the_true_ones() {
-    let runs = monte_carlo_runs();
-    for shape in [false, true] {
-        let spread = monte_carlo(runs, &Options { lens: Some(Lens::Brown4), shape: Some(shape), known: None });
-        let Spread { names, ratios, inside, lengths, lengths_by_calibration } = &spread;
-        // So many runs know a standard deviation to 1 / sqrt(2 runs); the numbers are correlated, so their median is hardly better.
-        let known_to = 1.0 / (2.0 * runs as f64).sqrt();
-        let middle = median(ratios.iter().copied()).unwrap();
-        let table: Vec<String> = names.iter().zip(ratios).map(|(name, ratio)| format!("{name} {ratio:.3}")).collect();
-        let said = format!(
-            "{runs} runs, shape free: {shape}; predicted / true sigma: median {:.3}, 95 % intervals hold {:.1} %, \
-             70 mm lengths {lengths:.3}, their calibration's share {lengths_by_calibration:.3}\n{}",
-            middle,
-            100.0 * inside,
-            table.join("\n")
-        );
-        println!("{said}");
-        assert!((middle - 1.0).abs() < 2.2 * known_to, "{said}");
-        assert!(ratios.iter().all(|r| (r - 1.0).abs() < 4.5 * known_to), "{said}");
-        assert!((0.91..0.985).contains(inside), "{said}");
-        // 24 lengths a run with corners of their own: known better than any number of the rig.
-        assert!((lengths - 1.0).abs() < 0.1, "{said}");
-        assert!((lengths_by_calibration - 1.0).abs() < 4.0 * known_to, "{said}");
-    }
 }
 
 #[test]
@@ -254,14 +145,12 @@ fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
 #[test]
 fn four_pairs_scatter_about_their_rig_as_far_as_many_do() {
     let excess = |pairs: usize, turn_deg: f64| {
-        const WORLDS: u64 = 9;
+        const WORLDS: u64 = 5;
         let of =
             |seed| pair_excess(&calibrate(&World::new(pairs, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap());
         (700..700 + WORLDS).map(|seed| of(seed).ln()).sum::<f64>() / WORLDS as f64
     };
-    for turn_deg in [0.01, 0.03] {
-        let (few, many) = (excess(4, turn_deg).exp(), excess(30, turn_deg).exp());
-        assert!(many > 2.0 && few > 0.95 * many && few < 2.5 * many, "{turn_deg}: {few} {many}");
-    }
+    let (few, many) = (excess(4, 0.03).exp(), excess(20, 0.03).exp());
+    assert!(many > 2.0 && few > 0.95 * many && few < 2.5 * many, "{few} {many}");
     assert!(excess(4, 0.0).exp() < 1.3);
 }

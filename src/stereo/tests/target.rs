@@ -157,15 +157,15 @@ fn points_are_not_off_by_what_turns_them_all_together() {
 /// What one pair of the calibration did, a pose may do: it is measured, and known as well as it agrees with the others.
 #[test]
 fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_well() {
+    let world = World::new(12, 47);
+    let clean = world.corners_by_hand(47, 0.01);
+    let found = calibrate(&clean, &BROWN4).unwrap();
     let mut kept = 0;
-    for times in [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 12.0] {
-        let world = World::new(12, 47);
-        let clean = world.corners_by_hand(47, 0.01);
+    for times in [5.0, 7.0, 9.0, 12.0] {
         let mut corners = clean.clone();
         corners.pairs[3] = world.corners_by_hand(48, 0.01 * times).pairs[3].clone();
-        let found = calibrate(&clean, &BROWN4).unwrap();
-        let farthest = |corners: &Corners| farthest_pair(&calibrate(corners, &BROWN4).unwrap()).unwrap();
-        assert!(farthest(&corners) > farthest(&clean), "{times}");
+        let farthest = farthest_pair(&calibrate(&corners, &BROWN4).unwrap());
+        assert!(farthest.unwrap() > farthest_pair(&found).unwrap(), "{times}");
         let of_pairs = Knowledge {
             noise: Some(found.own_noise),
             pair_excess: Some(pair_excess(&found)),
@@ -173,7 +173,7 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
             ..known(found.rig(), world.board)
         };
         let third = |known: &Knowledge| series::measure(known, run_of(corners.clone())).poses.swap_remove(3).target;
-        let usual = series::measure(&of_pairs, run_of(clean)).poses.swap_remove(3).target.unwrap();
+        let usual = series::measure(&of_pairs, run_of(clean.clone())).poses.swap_remove(3).target.unwrap();
         // Nobody said that a pair strayed so far; then somebody does.
         let refused = third(&of_pairs).is_err();
         let Ok(target) = third(&Knowledge { farthest_pair: Some(1e4), ..of_pairs }) else { continue };
@@ -195,7 +195,7 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
 #[test]
 fn a_focus_that_creeps_is_not_named_as_something_that_all_poses_have() {
     for ppm in [20.0, 100.0, 500.0] {
-        for seed in 50..54 {
+        for seed in 50..52 {
             let mut world = World { sigma_px: 0.002, ..World::new(14, seed) };
             let found = calibrate(&world.corners(seed + 10), &BROWN4).unwrap();
             world.board = Board::checker("7x6".parse().unwrap(), 10.0);

@@ -56,7 +56,7 @@ fn found(set: &Dataset, robot: &Robot) -> Option<Robots> {
 fn files_of_two_or_three_arms_are_told_with_what_each_leaves() {
     // Some draws are of arms that are nearly one within a single sphere; these are not.
     for (samples, off) in [(60, 1.0), (30, 1.0), (30, 3.0), (16, 3.0)] {
-        for seed in [1, 3, 4] {
+        for seed in [1, 3] {
             let worlds = [arm(samples, 0.0, 0.0, seed), arm(samples, off, 0.0, seed + 20)];
             let (set, robot) = tables(&worlds, true);
             let Robots { parts, together_mm } = found(&set, &robot).expect("two arms");
@@ -99,7 +99,7 @@ fn the_part_of_a_table_that_is_of_another_arm_is_found_where_it_begins() {
 
 #[test]
 fn one_robot_is_one_whatever_was_moved_beside_it() {
-    for seed in 0..9 {
+    for seed in [0, 4, 8] {
         let (samples, tool_mm) = ([12, 30, 60][seed as usize % 3], [0.0, 2.0, 60.0][seed as usize / 3 % 3]);
         for files in [true, false] {
             // The second table is by the same arm, with another tool, seen by a camera that was moved.
@@ -144,7 +144,7 @@ fn lacking(seed: u64, weighed: usize, by_deg: f64, order: usize) -> [(Dataset, R
 
 #[test]
 fn what_a_model_lacks_makes_no_robots_and_moves_no_tool() {
-    for seed in 0..8 {
+    for seed in 0..4 {
         for (set, robot) in lacking(seed, 2, 0.1, 1) {
             assert_eq!(found(&set, &robot), None, "{seed}");
         }
@@ -156,7 +156,7 @@ fn what_a_model_lacks_makes_no_robots_and_moves_no_tool() {
 
 #[test]
 fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
-    for seed in 0..6 {
+    for seed in 0..3 {
         for files in [true, false] {
             let (samples, tool_mm) = ([20, 40, 60][seed as usize % 3], [2.0, 20.0][seed as usize % 2]);
             let (set, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, tool_mm, seed + 50)], files);
@@ -184,7 +184,7 @@ fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
 
 #[test]
 fn rows_that_were_misread_are_no_other_tool_and_no_other_robot() {
-    for (seed, by_mm) in [(0, 10.0), (1, 10.0), (2, 1e3), (3, 1e3), (4, 1e7), (5, 1e7)] {
+    for (seed, by_mm) in [(0, 10.0), (2, 1e3), (4, 1e7)] {
         let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
         for row in [9, 47] {
             point_of(&mut set.poses[row]).y += by_mm;

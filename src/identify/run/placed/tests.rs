@@ -124,9 +124,9 @@ fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) ->
 #[test]
 fn stated_uncertainties_are_those_of_simulated_robots() {
     for oriented in [false, true] {
-        let Tally { sensor, target, coordinates, scatter } = tally(20, 60, oriented, Extensions::None);
+        let Tally { sensor, target, coordinates, scatter } = tally(8, 60, oriented, Extensions::None);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        // Four placements of twenty robots, and what they have in common: three standard deviations of a chi-squared over its degrees of freedom.
+        // Four placements of eight robots, and what they have in common: three standard deviations of a chi-squared over its degrees of freedom.
         assert!((0.7..1.4).contains(&mean(&sensor)), "{oriented}: placements {}", mean(&sensor));
         assert!((0.6..1.5).contains(&mean(&target)), "{oriented}: target {}", mean(&target));
         let share = coordinates.1 as f64 / coordinates.0 as f64;

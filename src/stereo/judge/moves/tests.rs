@@ -63,7 +63,7 @@ fn judged(corners: &Corners, moves: &[&str], tolerance_mm: f64) -> (Judged, Verd
 
 #[test]
 fn moves_that_are_as_stated_agree_and_scatter_as_they_say() {
-    const SEEDS: u64 = 50;
+    const SEEDS: u64 = 25;
     let (mut contradict, mut turned, mut squares) = (0, 0, 0.0);
     for seed in 0..SEEDS {
         // The block is as far off as it is stated.
@@ -77,8 +77,8 @@ fn moves_that_are_as_stated_agree_and_scatter_as_they_say() {
     }
     let scatter = (squares / SEEDS as f64).sqrt();
     // At most one in a hundred of either: of 600 seeds none contradict and 6 are said to have turned.
-    assert!(contradict <= 3 && turned <= 3, "{contradict} contradict, {turned} turned of {SEEDS}");
-    // So many draws know a standard deviation to 10 %.
+    assert!(contradict <= 2 && turned <= 2, "{contradict} contradict, {turned} turned of {SEEDS}");
+    // So many draws know a standard deviation to 14 %.
     assert!((0.7..1.3).contains(&scatter), "{scatter}");
 }
 
@@ -86,7 +86,7 @@ fn moves_that_are_as_stated_agree_and_scatter_as_they_say() {
 fn a_scale_that_is_wrong_is_seen_from_the_stated_size_on_with_its_size() {
     for percent in [0.1, 0.3, 1.0] {
         let mut seen = 0;
-        for seed in 0..6 {
+        for seed in 0..3 {
             let corners = said_larger(&slid(seed, &[(5.0, 0.0)]), seed, percent / 100.0);
             let (judged, allows, finding) = judged(&corners, &["5mm+-0.002:11,12"], 0.05);
             let known = &judged.facts.standards.moves.measured[0];
@@ -101,14 +101,14 @@ fn a_scale_that_is_wrong_is_seen_from_the_stated_size_on_with_its_size() {
             }
         }
         // Six in seven errors as large as the smallest are seen, more than nineteen in twenty of the others.
-        assert!(seen >= if percent < 0.2 { 4 } else { 6 }, "{percent} %: {seen} of 6");
+        assert!(seen >= if percent < 0.2 { 2 } else { 3 }, "{percent} %: {seen} of 3");
     }
 }
 
 #[test]
 fn a_move_that_is_stated_wrong_is_seen_and_others_tell_it_from_the_scale() {
     for (off_mm, percent) in [(0.01, 0.0), (0.05, 0.0), (0.2, 0.0), (0.0, 0.5)] {
-        for seed in 20..23 {
+        for seed in 20..22 {
             let world = slid(seed, &[(5.0 - off_mm, 0.0), (20.0 - off_mm, 0.0)]);
             let corners = said_larger(&world, seed, percent / 100.0);
             let one = measured(&corners, &["5mm:11,12"]);
@@ -142,7 +142,7 @@ fn a_move_that_agrees_and_tells_less_takes_nothing_from_one_that_tells_enough() 
 #[test]
 fn a_board_that_turned_is_said_with_its_turn_and_is_no_proof() {
     for deg in [0.05, 0.5] {
-        for seed in 30..34 {
+        for seed in 30..32 {
             let corners = slid(seed, &[(5.0, deg)]).corners(seed);
             let (judged, allows, finding) = judged(&corners, &["5mm:11,12"], 0.05);
             let known = &judged.facts.standards.moves.measured[0];
