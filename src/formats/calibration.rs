@@ -100,6 +100,11 @@ pub struct Calibrated {
 }
 
 impl Calibrated {
+    /// Whether the check of its lengths ended with FAIL.
+    pub fn has_failed(&self) -> bool {
+        self.check.is_some_and(|check| check.verdict == Verdict::Fail)
+    }
+
     /// What its own calibration says against the rig, for those who use it.
     pub fn doubts(&self) -> Vec<String> {
         let changed = self.unconfirmed.first().map(|last| {
