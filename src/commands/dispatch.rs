@@ -21,11 +21,17 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     if let Some(threads) = cli.threads {
         start_threads(threads)?;
     }
+    let settings = Config::file(cli.config.as_deref());
     let config = Config::load(cli.config.as_deref())?;
+    let uses_none =
+        matches!(cli.command, Command::Init(_) | Command::Guide(_) | Command::Completions(_) | Command::Man(_));
+    if let (None, Some(file), false) = (&cli.config, &settings, uses_none) {
+        progress::note(format!("settings: {file} of this folder; `--config FILE` names another"));
+    }
     let run = Run {
         command: (!cli.no_provenance).then(|| command_line(std::env::args_os().skip(1))),
         force: false,
-        inputs: Config::file(cli.config.as_deref()).into_iter().collect(),
+        inputs: settings.into_iter().collect(),
     };
     let before = earlier(&cli.command, &config);
     let now = || before.as_ref().and_then(|earlier| Earlier::of(&earlier.file));

@@ -21,18 +21,21 @@ pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
 /// What speaks against a rig.
 pub struct RigDoubts {
     pub said: Vec<String>,
-    /// With which status a command that uses the rig ends at best.
+    /// With which status a command ends at best that states the uncertainty of what it makes with the rig: of a rig that did not pass it states
+    /// more, of one that changed too little.
     pub status: Status,
+    /// The same of a command that states none.
+    pub status_without_uncertainty: Status,
 }
 
-/// Warns of what a rig's own calibration says against it, and a check that was made of it since. What is made with a rig that did not pass states
-/// its own uncertainty, so that the status is not the rig's; of one that changed it states too little.
+/// Warns of what a rig's own calibration says against it, and a check that was made of it since.
 pub fn heed_rig(rig: &Calibrated, file: &Utf8Path) -> RigDoubts {
     let changed = changed_since(file, "recheck.json");
     let status = if changed.is_some() { Status::OutOfTolerance } else { Status::Done };
     let said: Vec<String> = changed.into_iter().chain(rig.doubts()).collect();
     said.iter().for_each(progress::warn);
-    RigDoubts { said, status }
+    let failed = if rig.has_failed() { Status::OutOfTolerance } else { Status::Done };
+    RigDoubts { said, status, status_without_uncertainty: status.or_worse(failed) }
 }
 
 /// What the last check beside a result's file says against it, if it was of that very result.

@@ -81,7 +81,7 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let page = report::plan::page(&scene, &robot, &found, &record)?;
     report::page::write(&out, "plan.html", page)?;
     let stdout = if args.output.json { json } else { said(args, &found, &record, &out, earlier.as_deref()) };
-    Ok(Outcome { stdout, status: doubts.status })
+    Ok(Outcome { stdout, status: doubts.status_without_uncertainty })
 }
 
 /// Joints that turn and have no limits stay within half a turn either way: what they really can, the file does not say.

@@ -35,7 +35,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
-    let RigDoubts { said: mut doubts, status: at_best } = heed_rig(&calibrated, &rig_file);
+    let RigDoubts { said: mut doubts, status_without_uncertainty: at_best, .. } = heed_rig(&calibrated, &rig_file);
     let calibration::Calibrated { rig, board, volume, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);

@@ -77,6 +77,9 @@ pub struct Check {
     /// What lengths can be trusted to; none where the rig measures nothing, or something else than a length stands against it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     trusted_mm: Option<f64>,
+    /// Up to which length, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    length_mm: Option<f64>,
 }
 
 /// A rig and what its calibration says beside it; files made elsewhere do not say that.
@@ -100,6 +103,11 @@ pub struct Calibrated {
 }
 
 impl Calibrated {
+    /// Whether the check of its lengths ended with FAIL.
+    pub fn has_failed(&self) -> bool {
+        self.check.is_some_and(|check| check.verdict == Verdict::Fail)
+    }
+
     /// What its own calibration says against the rig, for those who use it.
     pub fn doubts(&self) -> Vec<String> {
         let changed = self.unconfirmed.first().map(|last| {
@@ -107,9 +115,10 @@ impl Calibrated {
         });
         let failed = self.check.filter(|check| check.verdict != Verdict::Pass).map(|check| {
             let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
+            let up_to = check.length_mm.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
             let trusted = check.trusted_mm.filter(|mm| mm.is_finite()).map_or_else(
                 || "no length can be trusted".to_owned(),
-                |mm| format!("lengths can be trusted to {} mm", at_most(mm, f64::INFINITY)),
+                |mm| format!("lengths{up_to} can be trusted to {} mm", at_most(mm, f64::INFINITY)),
             );
             format!(
                 "this rig did not pass its check ({verdict} at a tolerance of {} mm): {trusted}",
@@ -222,7 +231,7 @@ impl CalibrationFile {
         let [nearest_mm, farthest_mm] = facts.coverage.corner_depths_mm;
         let (verdict, tolerance_mm) = (judged.verdict, facts.tolerance_mm);
         let trusted_mm = judged.trusted_mm().filter(|_| !judged.measures_nothing());
-        self.check = Some(Check { verdict, tolerance_mm, trusted_mm });
+        self.check = Some(Check { verdict, tolerance_mm, trusted_mm, length_mm: Some(facts.volume.length_mm) });
         self.volume = Some(facts.volume.volume.clone());
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();

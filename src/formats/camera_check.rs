@@ -28,6 +28,8 @@ pub struct CameraCheckFile {
     evidence: Vec<Evidence>,
     /// The tolerance that the rig would meet, mm; null where something else than a length stands against it.
     trusted_mm: Option<f64>,
+    /// Up to which length, mm.
+    trusted_length_mm: f64,
     max_abs_error_mm: f64,
     /// Nineteen of twenty held-out lengths are off by no more, mm.
     within_95_mm: f64,
@@ -95,6 +97,7 @@ impl CameraCheckFile {
             tolerance_mm: judged.facts.tolerance_mm,
             evidence: judged.evidence.clone(),
             trusted_mm: judged.trusted_mm(),
+            trusted_length_mm: judged.facts.volume.length_mm,
             max_abs_error_mm: accuracy.extremes.max_abs_error_mm,
             within_95_mm: accuracy.extremes.one_in_twenty_mm,
             volume: judged.facts.volume.volume.clone(),

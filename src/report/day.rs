@@ -222,7 +222,9 @@ fn rig(check: &Value) -> Markup {
     let nominal = ranges.into_iter().flatten().filter_map(|r| r.get("nominal_mm")?.as_f64());
     let (least, most) = nominal.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
     let [error, uncertainty, sum] = judged(check);
-    let trusted = format!("lengths can be trusted to{}", trusted_by(check));
+    let up_to = check.pointer("/trusted_length_mm").and_then(Value::as_f64);
+    let up_to = up_to.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
+    let trusted = format!("lengths{up_to} can be trusted to{}", trusted_by(check));
     let rows = [
         ("length measurement error E of the length where E + U is largest", error, "mm"),
         ("its expanded uncertainty U (95 %)", uncertainty, "mm"),
@@ -312,7 +314,7 @@ mod tests {
     fn day(verdict: &str) -> Day {
         let check = json!({"verdict": verdict, "max_abs_error_mm": 0.0123, "tolerance_mm": 0.05, "second_board": null,
             "judged_length": {"error_mm": 0.0118, "uncertainty_mm": 0.00213, "at_most_mm": 0.01393},
-            "trusted_mm": 0.0214, "evidence": [
+            "trusted_mm": 0.0214, "trusted_length_mm": 70.0, "evidence": [
                 {"what": "held-out lengths", "value": 0.01393, "unit": "mm"}, {"what": "spread", "value": 0.0214, "unit": "px"},
                 {"what": "any length", "value": 0.0214, "unit": "mm"}],
             "ranges": [{"nominal_mm": 10.0, "count": 7}, {"nominal_mm": 70.0, "count": 5}]});
@@ -344,7 +346,7 @@ mod tests {
         shown("E + U", "0.0139");
         shown("limit of E + U (tolerance)", "0.05");
         shown("largest E of any length", "0.012");
-        shown("lengths can be trusted to (the largest of all checks in mm: any length)", "0.022");
+        shown("lengths of up to 70 mm can be trusted to (the largest of all checks in mm: any length)", "0.022");
         assert!(summary_line(&day("pass")).contains("error 0.0118 mm + expanded uncertainty 0.0021 mm = 0.0139 mm"));
     }
 

@@ -263,6 +263,13 @@ fn settings_as_init_writes_them_can_be_changed_line_by_line() {
     // What is said of the settings comes before what is said of the pictures.
     let output = stereocal(folder.path(), &["camera-check", "x"]);
     assert!(stderr(&output).contains("no pictures here"), "{}", stderr(&output));
+    // Settings that nobody named are said; `--quiet` and a file that is named need no word.
+    let settings = "settings: stereocal.toml of this folder";
+    assert!(stderr(&output).contains(settings), "{}", stderr(&output));
+    for named in [&["--config", "stereocal.toml"][..], &["--quiet"]] {
+        let output = stereocal(folder.path(), &[named, &["camera-check", "x"]].concat());
+        assert!(!stderr(&output).contains(settings), "{}", stderr(&output));
+    }
     refused(
         &["identify"],
         &[("stereocal.toml", "squares = \"9x7\"\n# [check_board]\n")],

@@ -33,6 +33,23 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
+/// A rig that failed its check plans poses, and the status says that it did not pass.
+#[test]
+fn a_rig_that_failed_is_planned_with_in_so_many_words() {
+    let folder = workplace();
+    let at = folder.path();
+    world(at);
+    let mut rig = json(&at.join("out/calibration.json"));
+    for (verdict, status) in [("pass", 0), ("undecided", 0), ("fail", 1)] {
+        rig["check"] =
+            serde_json::json!({"verdict": verdict, "tolerance_mm": 0.05, "trusted_mm": 0.2, "length_mm": 70.0});
+        std::fs::write(at.join("out/calibration.json"), rig.to_string()).unwrap();
+        let said = run(at, &[&["--poses", "8", "--verify", "2", "--force"], &QUICK[..]].concat(), status);
+        let doubt = "lengths of up to 70 mm can be trusted to 0.2 mm";
+        assert_eq!(said.contains(doubt), verdict != "pass", "{verdict}: {said}");
+    }
+}
+
 #[test]
 fn the_files_are_those_of_the_contract() {
     let folder = workplace();

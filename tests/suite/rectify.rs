@@ -123,6 +123,14 @@ fn corresponding_corners_stand_on_one_row() {
     let untrusted =
         stereocal(folder.path(), &["export", "calibration", "--format", "ros", "--calibration", "doubted.json"]);
     assert!(untrusted.status.code() == Some(0) && stderr(&untrusted).contains("no length can be trusted"));
+    // What is out of tolerance, whatever the uncertainty, makes nothing that states no uncertainty without a word in the status.
+    doubted["check"]["verdict"] = "fail".into();
+    std::fs::write(folder.path().join("failed.json"), doubted.to_string()).unwrap();
+    for made in [&["rectify", "check"][..], &["export", "calibration", "--format", "ros"]] {
+        let made = stereocal(folder.path(), &[made, &["--calibration", "failed.json", "--out", "failed"]].concat());
+        assert_eq!(made.status.code(), Some(1), "{}", stderr(&made));
+        assert!(stderr(&made).contains("did not pass its check (FAIL"), "{}", stderr(&made));
+    }
     assert!(page("out").contains("<div class=\"verdict good\"><strong>Rectified<"));
     let rms = number(&json(&folder.path().join("turned/rectified.json")), "/residual/rms_px");
     assert!(rms > 20.0 * ROWS_PX, "{rms}");

@@ -34,7 +34,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
-    let (known, RigDoubts { said: doubts, status }) = knowledge(args, config, &rig_file)?;
+    let (known, RigDoubts { said: doubts, status, .. }) = knowledge(args, config, &rig_file)?;
     let poses = measurements::read_poses(&list)?;
     if args.watch {
         let wanted = Wanted {

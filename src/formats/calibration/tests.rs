@@ -79,7 +79,8 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
     let (_keep, path) = files::temporary("calibration.json", "");
     let doubts = |check: Option<(Verdict, Option<f64>)>, unconfirmed: &[&str]| {
         let mut file = CalibrationFile::from(&plain());
-        file.check = check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm });
+        file.check =
+            check.map(|(verdict, trusted_mm)| Check { verdict, tolerance_mm: 0.05, trusted_mm, length_mm: Some(70.0) });
         file.unconfirmed = unconfirmed.iter().map(|pair| (*pair).to_owned()).collect();
         std::fs::write(&path, files::to_json(&file)).unwrap();
         let read = read(&path).unwrap();
@@ -89,7 +90,7 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
     assert_eq!(doubts(Some((Verdict::Pass, Some(0.0123))), &[]), "");
     assert_eq!(
         doubts(Some((Verdict::Fail, Some(1.3538))), &[]),
-        "this rig did not pass its check (FAIL at a tolerance of 0.05 mm): lengths can be trusted to 1.4 mm"
+        "this rig did not pass its check (FAIL at a tolerance of 0.05 mm): lengths of up to 70 mm can be trusted to 1.4 mm"
     );
     let open = doubts(Some((Verdict::Undecided, None)), &["0017"]);
     assert!(open.contains("from pair 0017 on") && open.ends_with("no length can be trusted"), "{open}");

@@ -120,7 +120,11 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
             ),
             Some(trusted_mm) => (
                 format!("{} mm", at_most(trusted_mm, judged.facts.tolerance_mm)),
-                format!("lengths can be trusted to this; the tolerance is {} mm", judged.facts.tolerance_mm),
+                format!(
+                    "{} can be trusted to this; the tolerance is {} mm",
+                    summary::lengths(judged),
+                    judged.facts.tolerance_mm
+                ),
             ),
             None => (
                 "not known".to_owned(),

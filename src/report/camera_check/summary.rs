@@ -3,6 +3,7 @@
 use crate::diagnostic::{at_most, count, two_digits};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
+use crate::report::page;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
@@ -255,6 +256,11 @@ pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> S
     deciding.map_or(others.clone(), |line| format!("deciding check: {}, {}; {others}", line.name(), figure(line)))
 }
 
+/// The lengths for which all lines of the ledger hold: of longer ones most lines say nothing.
+pub(super) fn lengths(judged: &Judged) -> String {
+    format!("lengths of up to {:.0} mm", judged.facts.volume.length_mm)
+}
+
 /// What the rig can be trusted to, whatever the tolerance.
 pub(super) fn trusted(judged: &Judged) -> String {
     match (judged.trusted(), judged.trusted_mm()) {
@@ -278,7 +284,7 @@ pub(super) fn trusted(judged: &Judged) -> String {
             // The held-out lengths stand in the line before.
             let is_first = judged.evidence.first().is_some_and(|first| first.what == line.what);
             let why = if is_first { String::new() } else { format!(" ({})", line.name()) };
-            format!("lengths can be trusted to {mm:.4} mm{why}")
+            format!("{} can be trusted to {mm:.4} mm{why}", lengths(judged))
         }
         _ => {
             let is_open = |line: &&Evidence| line.value.is_none() || (line.unit != "mm" && line.unit != "px");
@@ -305,7 +311,7 @@ pub(super) fn advice(judged: &Judged) -> String {
                 Extent::Boards => "the volume where the boards stood".to_owned(),
                 asked => asked.said(),
             };
-            format!("Lengths can be trusted to {} mm in {over}.", at_most(trusted, sure))
+            format!("{} can be trusted to {} mm in {over}.", page::capital(&lengths(judged)), at_most(trusted, sure))
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."

@@ -91,8 +91,9 @@ pub struct Along {
     common: DVector<f64>,
     /// Which share of it each pair has.
     by_pair: DVector<f64>,
-    /// Variance of its size over the square of that.
-    relative_variance: f64,
+    /// What it explains, and how the pairs scatter beside it.
+    gain: f64,
+    scatter: f64,
 }
 
 impl Along {
@@ -119,9 +120,10 @@ impl Along {
         self.to(1.0)
     }
 
-    /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step.
-    pub fn sigma_of(&self, share: f64) -> DVector<f64> {
-        self.to(share) * self.relative_variance.sqrt()
+    /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step; `noise` is the variance of
+    /// the corners without the change over the one that they were weighed by, at which the pairs scatter at least.
+    pub fn sigma_of(&self, share: f64, noise: f64) -> DVector<f64> {
+        self.to(share) * (self.scatter.max(noise) / self.gain).sqrt()
     }
 }
 
@@ -322,7 +324,8 @@ fn finding(
             whole,
             common: shown.change.common.clone(),
             by_pair: best.by_pair.clone(),
-            relative_variance: shown.change.scatter / shown.change.gain,
+            gain: shown.change.gain,
+            scatter: shown.change.scatter,
         }),
     })
 }

@@ -57,10 +57,10 @@ pub fn look(
         |numbers: std::ops::Range<usize>| linear.change(&numbers.map(direction).collect::<Vec<_>>(), &vec![1.0; pairs]);
     let way = change(WAY)?;
     let freedom = (WAY.len() * (pairs - 2)) as f64;
-    let f = way.gain / WAY.len() as f64 / way.scatter;
+    let f = way.gain / WAY.len() as f64 / way.scatter.max(1.0);
     let others: Vec<Change> = OTHERS.into_iter().filter_map(change).collect();
     // The scatter of the one that explains most is what the others are judged by.
-    let scatter = others.iter().map(|c| c.scatter).fold(way.scatter, f64::min);
+    let scatter = others.iter().map(|c| c.scatter).fold(way.scatter, f64::min).max(1.0);
     let evidence = |c: &Change| 0.5 * (c.gain / scatter - c.amounts.len() as f64 * (pairs as f64).ln());
     let told_apart = others.iter().all(|other| evidence(&way) - evidence(other) > TOLD_APART);
     if !told_apart || FisherSnedecor::new(WAY.len() as f64, freedom).map_or(1.0, |d| d.sf(f)) >= CHANCE {

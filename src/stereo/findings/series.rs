@@ -25,7 +25,8 @@ pub struct Change {
     pub common: DVector<f64>,
     /// By how much chi-squared falls.
     pub gain: f64,
-    /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect.
+    /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect: below one where what the corners are
+    /// said to scatter by has the change in it.
     pub scatter: f64,
 }
 
@@ -140,7 +141,7 @@ impl Linear {
         (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, common, gain, scatter })
     }
 
-    /// The pairs' scatter along these directions with the change taken out, at least what their corners let expect.
+    /// The pairs' scatter along these directions with the change taken out.
     fn scatter(
         &self,
         directions: &[DVector<f64>],
@@ -158,6 +159,6 @@ impl Linear {
             }
         }
         let freedom = (directions.len() * self.pairs().saturating_sub(2)).max(1) as f64;
-        (squares / freedom).max(1.0)
+        squares / freedom
     }
 }

@@ -247,16 +247,20 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
 fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: &Corners) {
     let board_may_grow = change.may_be(Cause::OtherBoard);
     if let Some(along) = &mut change.along {
+        let mut noise = 1.0;
         if change.kind == Kind::Drift {
             match without_drift::at_share(found, corners, &asked.options, along, MIDDLE) {
                 Some(still) => {
+                    // What the corners were said to scatter by had the drift in it.
+                    let [own, with_drift] = [&still, &*found].map(|c| c.noise.typical_px(&c.views));
+                    noise = still.inflation * (own / with_drift).powi(2);
                     *along = along.in_layout(&found.layout, &still.layout);
                     *found = still;
                 }
                 None => found.move_rig(&along.to(MIDDLE)),
             }
         }
-        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE) } else { along.to_last() }];
+        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE, noise) } else { along.to_last() }];
         if change.kind == Kind::Drift {
             *along = along.seen_from(MIDDLE);
             found.since_moment.push(along.to_last());
