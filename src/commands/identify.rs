@@ -48,10 +48,12 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
         shared::take(record, &mut set);
     }
     shared::suppose_scale(&mut set);
+    let as_read = set;
     let bar = progress::bar("identifying", 2 + step_count(&settings));
     let Examined { set, robot: nominal, along, findings, against, unexplained } =
-        examine::examine(&set, &given, &settings, &|step| bar.begin(step));
+        examine::examine(&as_read, &given, &settings, &|step| bar.begin(step));
     if unexplained.is_some() {
+        examine::in_hand::refuse(&as_read, &given)?;
         examine::in_hand::refuse(&set, &nominal)?;
     }
     let doubts = (unexplained.is_some(), along.robots.is_some());

@@ -57,12 +57,13 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &robot)?;
     }
-    let trust = known::trust(&args.robot);
+    let (trust, open) = (known::trust(&args.robot), known::left_open(&args.robot, &robot));
     // Of a robot that is another one nothing is told, whatever the poses are.
-    let located = locate(&set, &robot, trust, &config.identify).map_err(|error| match (error, &unexplained) {
-        (Error::Open { .. }, Some(finding)) => Error::OtherRobot { why: finding.finding.clone() },
-        (error, _) => error,
-    })?;
+    let located =
+        locate(&set, &robot, trust, open.as_ref(), &config.identify).map_err(|error| match (error, &unexplained) {
+            (Error::Open { .. }, Some(finding)) => Error::OtherRobot { why: finding.finding.clone() },
+            (error, _) => error,
+        })?;
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), &located.placed.robot, &all);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);

@@ -210,16 +210,7 @@ impl Source {
             Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),
             Verdict::Open(..) if widened => Err(unsettled::rows_of_pose(parts)),
             Verdict::Open(a, b) => Err(unsettled::open(parts, &a, &b)),
-            Verdict::NoUnit { joints } => {
-                let (what, hint) = match joints {
-                    true => ("joints are degrees or radians", "`--units deg` or `--units rad` says it"),
-                    false => ("points are mm or m", "`--units mm` or `--units m` says it (`--units rad,m` both)"),
-                };
-                let message = format!(
-                    "no column name tells whether the {what}, the numbers could be either, and the nominal robot does not tell"
-                );
-                Err(parts[0].refuse(message, Some(hint)))
-            }
+            Verdict::NoUnit { joints, lengths } => Err(unsettled::no_unit(parts, joints, lengths)),
             Verdict::None => {
                 let mixed = || parts.iter().find_map(Part::mixed);
                 Err(apart(judge::usual(&candidates, self.forced()))

@@ -45,6 +45,12 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
             fit.rms_mm, fit.chi_square
         ),
     });
-    lines.push(format!("95 % intervals; covariances: {}", out.join(PLACEMENT)));
+    let of_robot = match fit.robot_uncertain {
+        true => "with what the identification left open of the robot",
+        false => {
+            "of a robot that is taken as exact but for its scatter: nothing beside its file says how well its parameters are known"
+        }
+    };
+    lines.push(format!("95 % intervals, {of_robot}; covariances: {}", out.join(PLACEMENT)));
     lines.join("\n") + "\n"
 }

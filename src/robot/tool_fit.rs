@@ -68,19 +68,35 @@ impl Robot {
         if count < FEWEST {
             return None;
         }
-        let all = self.rows(joints_rad, points_mm, count.div_ceil(POSES));
-        let spread_mm = middle_spread(&all.iter().map(|row| row.point).collect::<Vec<_>>())?;
-        let of_start = |tool| without_gross(&all, from_start(&all, tool), descended);
-        let left = |(frame, tool): &(Transform, Vector3<f64>)| middle(&all, frame, tool);
-        let mut best = of_start(self.tool_mm);
-        if from == Start::Around && left(&best) > SETTLED * spread_mm {
-            let off = |k: usize| Vector3::ith(k % 3, if k < 3 { spread_mm } else { -spread_mm });
-            let others = (0..6).map(|k| of_start(self.tool_mm + off(k)));
-            best = others.fold(best, |best, other| if left(&other) < left(&best) { other } else { best });
-        }
-        let left_mm = left(&best);
-        left_mm.is_finite().then_some(ToolFit { tool_mm: best.1, left_mm, spread_mm })
+        fit(&self.rows(joints_rad, points_mm, count.div_ceil(POSES)), self.tool_mm, from)
     }
+
+    /// The same of cameras on the flange that see a target that stands still: seen from the flange it is the base that moves, and the tool that is found
+    /// is the target's place there.
+    pub fn fit_backwards(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<ToolFit> {
+        let count = joints_rad.len().min(points_mm.len());
+        let mut all = self.rows(joints_rad, points_mm, count.div_ceil(POSES).max(1));
+        all.iter_mut().for_each(|row| row.flange = row.flange.inverse());
+        // A target may stand anywhere: about where the flange has been is as good a place as any.
+        let middle = all.iter().map(|row| row.flange.inverse().translation.vector).sum::<Vector3<f64>>()
+            / all.len().max(1) as f64;
+        fit(&all, middle, Start::Around).filter(|_| count >= FEWEST)
+    }
+}
+
+/// See [`Robot::fit_tool`].
+fn fit(all: &[Row], tool_mm: Vector3<f64>, from: Start) -> Option<ToolFit> {
+    let spread_mm = middle_spread(&all.iter().map(|row| row.point).collect::<Vec<_>>())?;
+    let of_start = |tool| without_gross(all, from_start(all, tool), descended);
+    let left = |(frame, tool): &(Transform, Vector3<f64>)| middle(all, frame, tool);
+    let mut best = of_start(tool_mm);
+    if from == Start::Around && left(&best) > SETTLED * spread_mm {
+        let off = |k: usize| Vector3::ith(k % 3, if k < 3 { spread_mm } else { -spread_mm });
+        let others = (0..6).map(|k| of_start(tool_mm + off(k)));
+        best = others.fold(best, |best, other| if left(&other) < left(&best) { other } else { best });
+    }
+    let left_mm = left(&best);
+    left_mm.is_finite().then_some(ToolFit { tool_mm: best.1, left_mm, spread_mm })
 }
 
 /// Where the search for a tool begins.

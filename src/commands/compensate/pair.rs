@@ -151,7 +151,7 @@ fn of_one_tool(nominal: &Robot, identified: Robot, file: &Utf8Path) -> Robot {
         return identified;
     }
     let tool = tool_text(&taken.tool_mm.into());
-    progress::note(format!(
+    progress::warn(format!(
         "the last link of {file} is not that of the nominal robot: what it has more is the tool's, which then stands at {tool} mm; a point cannot \
          tell the two apart"
     ));

@@ -15,6 +15,7 @@ mod link;
 mod lists;
 mod matrix;
 mod numbered;
+mod repeated;
 mod robots;
 mod scan;
 #[cfg(test)]
@@ -64,13 +65,13 @@ pub struct Links {
     /// The base and the tool that a toolbox is told.
     pub ends: [Option<End>; 2],
     /// What was taken of them, and what was not.
-    pub ends_said: String,
+    pub ends_said: Vec<String>,
 }
 
 /// Reads a text; `prose` says that it is one of sentences, without code.
 pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     let (code, comments) = comments::split(text);
-    let code = comments::without_demonstration(&code);
+    let code = repeated::expanded(&comments::without_demonstration(&code))?;
     let words = if prose { Words::of(text, "") } else { Words::of(&comments, &code) };
     let mut scan = Scan { text: &code, line: 1, ..Scan::default() };
     scan.run()?;
@@ -80,6 +81,10 @@ pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
         return Err((1 + lower[..at].matches('\n').count() as u64, SLIDES.to_owned()));
     }
     added::none(&code, &scan.links)?;
+    // What a loop takes out of lists is read from the lists.
+    if scan.wrong.is_none() {
+        repeated::none(&code, &scan.links)?;
+    }
     robots::of_one(&code, &scan.links.iter().map(|link| link.line).collect::<Vec<_>>())?;
     let known = std::mem::take(&mut scan.known);
     let mut links = links(scan, lower.contains("qlim"))?;
@@ -135,6 +140,6 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
         limits: links.iter().map(|link| link.limits).collect(),
         limited,
         ends: [None; 2],
-        ends_said: String::new(),
+        ends_said: Vec::new(),
     }))
 }

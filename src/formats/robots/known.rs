@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 use crate::files::provenance::{Digested, Provenance};
 use crate::identify::judge::lengths::MEAN_OVER_RMS;
-use crate::identify::judge::locate::Trust;
+use crate::identify::judge::locate::{LeftOpen, Trust};
 use crate::identify::judge::recheck::Before;
 use crate::identify::judge::uncertainty::Covariance;
 use crate::identify::model::ladder::Terms;
@@ -64,6 +64,8 @@ impl Identified {
 #[derive(Debug, Deserialize)]
 struct Expected {
     mean_mm: f64,
+    #[serde(default)]
+    scatter_mm: f64,
     p95_mm: f64,
     #[serde(default)]
     freedom: Option<f64>,
@@ -90,12 +92,22 @@ fn beside(robot: &Utf8Path) -> Option<Identified> {
 /// How far to trust a robot: what its identification says that a coordinate is off by, or a common arm's repeatability.
 pub fn trust(robot: &Utf8Path) -> Trust {
     let identified = beside(robot).unwrap_or_default();
-    // Over the root of three, and of a mean length over that of its square.
-    let of_coordinate = |e: &Expected| e.mean_mm / (MEAN_OVER_RMS * 3f64.sqrt());
     Trust {
-        point_mm: identified.expected.as_ref().map_or(REPEATABILITY_MM, of_coordinate),
+        point_mm: identified.expected.as_ref().map_or(REPEATABILITY_MM, |e| of_coordinate(e.mean_mm)),
         rotation_rad: identified.scatter_rad,
     }
+}
+
+/// The error of a coordinate whose points are off by so much on average: over the root of three, and of a mean length over that of its square.
+fn of_coordinate(mean_mm: f64) -> f64 {
+    mean_mm / (MEAN_OVER_RMS * 3f64.sqrt())
+}
+
+/// What the identification of a robot left open of it. `None` where nothing beside its file says so.
+pub fn left_open(file: &Utf8Path, robot: &Robot) -> Option<LeftOpen> {
+    let point_mm = of_coordinate(beside(file)?.expected?.scatter_mm);
+    let Before { parameters, covariance, freedom, .. } = before(file, robot)?;
+    Some(LeftOpen { parameters, covariance, freedom, point_mm })
 }
 
 /// The ranges of the joints over which a robot was identified, rad (mm where a joint slides). `None` where nothing beside its file says so.

@@ -95,7 +95,7 @@ pub fn examine(set: &Dataset, robot: &Robot) -> (Dataset, Option<Finding>) {
 
 /// Looks for a shift.
 pub fn find(set: &Dataset, robot: &Robot) -> Option<Shift> {
-    let rows = Rows::new(set, robot, false)?;
+    let rows = Rows::new(set, robot)?;
     let count = rows.points.len();
     let before = rows.left(count, 0);
     let last = count - FEWEST;
@@ -143,17 +143,13 @@ fn mended(set: &Dataset, shift: &Shift) -> Dataset {
 }
 
 impl Rows {
-    /// `None` of sets of anything but whole points, and of too few. `backwards` as seen from the flange.
-    pub(super) fn new(set: &Dataset, robot: &Robot, backwards: bool) -> Option<Rows> {
+    /// `None` of sets of anything but whole points, and of too few.
+    pub(super) fn new(set: &Dataset, robot: &Robot) -> Option<Rows> {
         let whole = set.poses.iter().all(|pose| pose.on_body_mm.is_none());
         if set.kind != Kind::Positions || set.poses.len() < FEWEST_ROWS || !whole {
             return None;
         }
-        let flange = |joints: &[f64]| {
-            let flange = robot.base_from_flange(joints);
-            if backwards { flange.inverse() } else { flange }
-        };
-        let flanges: Vec<Transform> = set.poses.iter().map(|pose| flange(&pose.joints_rad)).collect();
+        let flanges: Vec<Transform> = set.poses.iter().map(|pose| robot.base_from_flange(&pose.joints_rad)).collect();
         Some(Rows {
             origins: flanges.iter().map(|f| f.translation.vector).collect(),
             rotations: flanges.iter().map(rotation_matrix).collect(),
@@ -161,11 +157,6 @@ impl Rows {
             points: set.poses.iter().map(|pose| pose.reading.point_mm()).collect::<Option<Vec<_>>>()?,
             tool_mm: robot.tool_mm,
         })
-    }
-
-    /// Median distance of the readings with the target's place free.
-    pub(super) fn median_mm(&self, rounds: usize) -> f64 {
-        median(self.errors_mm(rounds).into_iter().filter(|error| error.is_finite())).unwrap_or(f64::INFINITY)
     }
 
     /// The distance of each reading with the target's place free; infinite where too few rows place it.

@@ -2,7 +2,8 @@
 //!
 //! In: points, orientations where there are any, a robot, and what is known of how it scatters. Out: the placements, the chi-squared of the fit
 //! against what is stated of readings and robot, and covariances that hold for few poses: a scatter that these poses themselves had to tell is
-//! made larger by Student's quantile over the normal one. Without orientations, and where the points leave the target's place open, it is held
+//! made larger by Student's quantile over the normal one. What an identification left open of the robot is part of them: all poses share it, and
+//! placements and target follow it. Without orientations, and where the points leave the target's place open, it is held
 //! as the robot's file has it. Goes wrong: poses that leave a direction open are refused with that direction; a robot that is wrong in a
 //! way that a placement can take up is not seen.
 
@@ -10,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
-use super::placement::Placed;
+use super::placement::{Placed, is_held};
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::rows::Rows;
@@ -19,7 +20,7 @@ use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::task::Task;
-use crate::linear_algebra::{product, pseudo_inverse, without};
+use crate::linear_algebra::{Eliminated, product, pseudo_inverse, without};
 use crate::robot::{Parameter, Robot};
 
 /// Fewest poses of a placement.
@@ -43,6 +44,18 @@ pub struct Trust {
     pub rotation_rad: Option<f64>,
 }
 
+/// What an identification left open of a robot.
+#[derive(Debug, Clone)]
+pub struct LeftOpen {
+    pub parameters: Vec<Parameter>,
+    /// Their covariance, mm and mrad.
+    pub covariance: DMatrix<f64>,
+    /// Degrees of freedom that tell how large it is.
+    pub freedom: f64,
+    /// How far a coordinate of its points is off beside what these parameters move it by, mm.
+    pub point_mm: f64,
+}
+
 /// Where everything is.
 #[derive(Debug, Clone)]
 pub struct Located {
@@ -63,6 +76,8 @@ pub struct Fit {
     pub freedom: usize,
     /// Whether the points contradict the robot.
     pub contradicted: bool,
+    /// Whether what an identification left open of the robot is in the covariances; else the robot is taken as exact but for its scatter.
+    pub robot_uncertain: bool,
 }
 
 impl Fit {
@@ -71,31 +86,38 @@ impl Fit {
                                     target and joint angles are those of these rows";
 }
 
-/// Finds it.
-pub fn locate(set: &Dataset, robot: &Robot, trust: Trust, settings: &Settings) -> Result<Located, Error> {
+/// Finds it; `open` where an identification says what it left open of this robot.
+pub fn locate(
+    set: &Dataset,
+    robot: &Robot,
+    trust: Trust,
+    open: Option<&LeftOpen>,
+    settings: &Settings,
+) -> Result<Located, Error> {
     let rows = set.placing_rows(FEWEST_POSES)?;
     let oriented = set.has_rotations();
     let tool = [Parameter::V(0), Parameter::V(1), Parameter::V(2)];
     let extras = set.target_unknowns(oriented);
     let model = if oriented { Model::Pose } else { Model::Position };
     let with = |parameters| Task { extras, model, ..Task::plain(set, robot, parameters, &rows, settings) };
-    match fitted(&with(&tool), trust) {
+    match fitted(&with(&tool), trust, open) {
         // Points alone may leave open what the file says.
         Err(Error::Open { .. } | Error::TooFew { .. } | Error::NothingDetermined { .. }) if !oriented => {
-            fitted(&with(&[]), trust)
+            fitted(&with(&[]), trust, open)
         }
         located => located,
     }
 }
 
-fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
+fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located, Error> {
     let mut formulation = Formulation::new(task)?;
     let offsets = formulation.offsets_of();
     let found = formulation.rows.scatter;
     // What the rows themselves tell of the scatter is never taken for less than what is known of it.
     let told = found.point_mm > trust.point_mm;
+    let known_mm = open.map_or(trust.point_mm, |open| open.point_mm);
     let scatter = Scatter {
-        point_mm: found.point_mm.max(trust.point_mm),
+        point_mm: if told { found.point_mm } else { known_mm },
         rotation_rad: trust.rotation_rad.map_or(found.rotation_rad, |known| found.rotation_rad.max(known)),
         stated: found.stated.max(1.0),
         ..Scatter::of_point(0.0)
@@ -109,20 +131,59 @@ fn fitted(task: &Task, trust: Trust) -> Result<Located, Error> {
     let numbers: usize = formulation.rows.blocks.iter().map(|b| b.row_count()).sum();
     let whole_freedom = numbers.saturating_sub(unknowns);
     let turns_told = task.model == Model::Pose && scatter.rotation_rad > trust.rotation_rad.unwrap_or(0.0);
-    let student = if told || turns_told { student(whole_freedom) } else { 1.0 };
+    let student = if told || turns_told { student(whole_freedom as f64) } else { 1.0 };
     let shared = formulation.offsets_covariance(&|_| false) * student;
-    let placed = Placed::new(task.set, &formulation.rows, &offsets, &vec![0.0; offsets.len()], &shared, student);
-    let placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
+    let of_fit = (formulation.rows, offsets.clone(), shared);
+    let (rows, of_all, shared) = match open {
+        Some(open) => with_robot(task, of_fit, &load_chain, open),
+        None => of_fit,
+    };
+    let placed = Placed::new(task.set, &rows, &of_all, &vec![0.0; of_all.len()], &shared, student);
+    let mut placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
+    placed.target_found = !task.parameters.is_empty();
     let (chi_square, freedom, rms_mm) = misfit(task, trust, &offsets);
     let contradicted =
         ChiSquared::new(freedom as f64).is_ok_and(|law| law.cdf(chi_square) > 1.0 - FALSE_ALARM && freedom > 0);
     let poses = task.set.poses.len();
-    Ok(Located { placed, fit: Fit { poses, rms_mm, chi_square, freedom, contradicted } })
+    let robot_uncertain = open.is_some();
+    Ok(Located { placed, fit: Fit { poses, rms_mm, chi_square, freedom, contradicted, robot_uncertain } })
+}
+
+/// Rows, offsets and their covariance of a fit with a robot that was held, with what is open of the robot before the unknowns that were fitted: these
+/// follow it. What only moves the whole robot is what a placement is, and what only moves the target on the flange is the target's where that is
+/// fitted: neither is open.
+fn with_robot(
+    task: &Task,
+    (rows, offsets, fitted): (Rows, Vec<f64>, DMatrix<f64>),
+    load_chain: &Robot,
+    open: &LeftOpen,
+) -> (Rows, Vec<f64>, DMatrix<f64>) {
+    let target_fitted = !task.parameters.is_empty();
+    let joints = if target_fitted { task.robot.joints.len() } else { usize::MAX };
+    let is_open = |p: Parameter| !(is_held(p, joints) || target_fitted && matches!(p, Parameter::V(_)));
+    let at: Vec<usize> = (0..open.parameters.len()).filter(|&i| is_open(open.parameters[i])).collect();
+    let of_robot = at.iter().map(|&i| open.parameters[i]);
+    let parameters: Vec<Parameter> = of_robot.chain(task.parameters.iter().copied()).collect();
+    let count = at.len();
+    let rows = Task { parameters: &parameters, ..*task }.rows_at(rows.scatter, load_chain);
+    let offsets = [vec![0.0; count], offsets].concat();
+    let mut normal = DMatrix::zeros(offsets.len(), offsets.len());
+    for placement in &Linearised::new(&rows, &offsets).placements {
+        normal += placement.eliminated().normal;
+    }
+    let follow = -Eliminated::new(&normal, count).follow;
+    let mut moves = DMatrix::identity(offsets.len(), count);
+    moves.view_mut((count, 0), follow.shape()).copy_from(&follow);
+    let of_open = open.covariance.select_rows(&at).select_columns(&at) * student(open.freedom);
+    let mut covariance = &moves * of_open * moves.transpose();
+    let mut own = covariance.view_mut((count, count), fitted.shape());
+    own += fitted;
+    (rows, offsets, covariance)
 }
 
 /// By how much variances that so many degrees of freedom told are to be larger, that intervals of 1.96 standard deviations hold.
-fn student(freedom: usize) -> f64 {
-    let quantile = StudentsT::new(0.0, 1.0, freedom.max(1) as f64).map_or(NORMAL_95, |t| t.inverse_cdf(0.975));
+fn student(freedom: f64) -> f64 {
+    let quantile = StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(NORMAL_95, |t| t.inverse_cdf(0.975));
     (quantile / NORMAL_95).powi(2)
 }
 

@@ -121,8 +121,8 @@ pub(in crate::measurements) enum Verdict {
     WrongUnit { stated: Way, better: Way },
     /// Two ways that would do.
     Open(Way, Way),
-    /// Nothing says which unit it is.
-    NoUnit { joints: bool },
+    /// Nothing says which unit one of them is in.
+    NoUnit { joints: Option<Unit>, lengths: Option<Unit> },
     /// No way is near.
     None,
 }
@@ -304,7 +304,7 @@ fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Ve
             let judged = ways.iter().find(|way| way.joints == joints && way.lengths == lengths).cloned();
             Verdict::Taken(judged.unwrap_or_else(|| Way::unjudged(picked, joints, lengths)), Basis::Sizes)
         }
-        (joints, _) => Verdict::NoUnit { joints: joints.is_none() },
+        (joints, lengths) => Verdict::NoUnit { joints, lengths },
     }
 }
 

@@ -13,6 +13,10 @@ pub(in crate::measurements) fn lacking(parts: &[Part], picked: &Picked, count: u
         let shown = p.names.as_ref().map(|n| n.iter().take(40).cloned().collect::<Vec<_>>().join(", "));
         match shown {
             Some(names) => format!("{} has {names}", p.file_name()),
+            // Of a language that is not known nothing says whether these are joints or places of the tool.
+            None if matches!(p.grid.form, Form::Program { degrees: false, .. }) => {
+                format!("{} has lists of {} numbers in a program's lines", p.file_name(), p.width())
+            }
             None if p.is_program() => format!("{} has the joint targets of a program", p.file_name()),
             None => {
                 format!("{} has {} columns without names, {} of them numbers", p.file_name(), p.width(), p.free().len())
@@ -30,11 +34,18 @@ pub(in crate::measurements) fn lacking(parts: &[Part], picked: &Picked, count: u
     let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
     let hint = format!(
         "{}{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
-         `--columns j1,j2,...,-,x,y,z` names the columns in their order, `-` skips one",
+         `--columns j1,j2,...,-,x,y,z` names the columns{} in their order, `-` skips one",
         lying(parts, count),
-        touches
+        touches,
+        side_by_side(parts)
     );
     parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
+}
+
+/// Which columns `--columns` names where there are several files.
+fn side_by_side(parts: &[Part]) -> String {
+    let files: Vec<String> = parts.iter().map(|p| format!("{} of {}", p.width_of_file(), p.file_name())).collect();
+    if parts.len() > 1 { format!(" of all files side by side ({})", files.join(", ")) } else { String::new() }
 }
 
 /// What to do with a table whose rows are as many as the columns that a pose has.
@@ -96,10 +107,11 @@ pub(in crate::measurements) fn unplaced(parts: &[Part], picked: &Picked, forced:
         return lacking(parts, &Picked { joints: picked.joints.clone(), ..Picked::default() }, count);
     }
     let hint = format!(
-        "{}`--columns` names the {} columns in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
+        "{}`--columns` names the {} columns{} in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
          look at `--robot`, too: its file must be of this robot",
         lying(parts, count),
-        parts.iter().map(Part::width_of_file).sum::<usize>()
+        parts.iter().map(Part::width_of_file).sum::<usize>(),
+        side_by_side(parts)
     );
     let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
         true => "the joints",
@@ -163,4 +175,19 @@ pub(in crate::measurements) fn wrong_unit(parts: &[Part], stated: &Way, better: 
     let (said, found) = (said.flag(), found.flag());
     let hint = format!("`--units {found}` if they are {found_word}; `--units {said}` keeps what the names say");
     parts[columns[0].part].refuse(message, Some(&hint))
+}
+
+/// That nothing tells a unit, with flags of which each says both: one that said the open one alone would take back what another had said.
+pub(in crate::measurements) fn no_unit(parts: &[Part], joints: Option<Unit>, lengths: Option<Unit>) -> Error {
+    let open = [(joints, "joints are degrees or radians"), (lengths, "points are mm or m")];
+    let what: Vec<&str> = open.iter().filter(|(unit, _)| unit.is_none()).map(|(_, what)| *what).collect();
+    let message = format!(
+        "no column name tells whether the {}, the numbers could be either, and the nominal robot does not tell",
+        what.join(", nor whether the ")
+    );
+    let either = |unit: Option<Unit>, all: [Unit; 2]| unit.map_or(all.to_vec(), |unit| vec![unit]);
+    let lengths = either(lengths, [Unit::Mm, Unit::M]);
+    let of_joints = |joints: Unit| lengths.iter().map(move |l| format!("`--units {},{}`", joints.flag(), l.flag()));
+    let flags: Vec<String> = either(joints, [Unit::Deg, Unit::Rad]).into_iter().flat_map(of_joints).collect();
+    parts[0].refuse(message, Some(&format!("{} says it", flags.join(" or "))))
 }

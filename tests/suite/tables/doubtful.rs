@@ -252,3 +252,34 @@ fn rows_of_a_pose_of_which_one_is_missing_are_told_with_a_form_that_takes_them()
     let (found, _) = source(&[&folder.file("named.csv", named)]).read(&robot).expect("named");
     assert!(found.len() == 72 && found[0].target == "a" && found[10].target == "b", "{:?}", found[10]);
 }
+
+/// Points that vary along one axis alone leave both units open: each flag that is named settles both, and nothing is asked again.
+#[test]
+fn units_that_are_open_are_asked_once() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(12);
+    let small = |q: &[f64], p: &[f64; 3]| [q.iter().map(|v| v / 30.0).collect(), vec![1.0, 2.0, p[2].sin()]].concat();
+    let file = folder.file("open.csv", text("J1,J2,J3,J4,J5,J6,X,Y,Z", &rows, ",", small));
+    let flags = ["deg,mm", "deg,m", "rad,mm", "rad,m"];
+    let named: Vec<String> = flags.iter().map(|flag| format!("`--units {flag}`")).collect();
+    refused(&source(&[&file]), &robot, &named.iter().map(String::as_str).collect::<Vec<_>>());
+    let with = |units: &str| Source { units: Some(units.to_owned()), ..source(&[&file]) };
+    refused(&with("deg"), &robot, &["whether the points are mm or m,", "`--units deg,mm` or `--units deg,m` says it"]);
+    refused(&with("mm"), &robot, &["joints are degrees or radians,", "`--units deg,mm` or `--units rad,mm` says it"]);
+    for units in flags {
+        assert_eq!(with(units).read(&robot).unwrap().0.len(), 12, "{units}");
+    }
+}
+
+/// Where two files lack something, the columns of both are those that a flag names, and lists of a program that no language says are no joints by that.
+#[test]
+fn what_is_lacking_is_said_of_all_files() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(12);
+    let moves: String = rows.iter().map(|(q, _)| format!("MOVL({q:?})\n")).collect();
+    let moves = folder.file("moves.txt", moves);
+    refused(&source(&[&moves]), &robot, &["moves.txt has lists of 6 numbers in a program's lines"]);
+    let part = |name: &str| folder.file(name, text("u,v", &rows, ",", |q, _| vec![q[0], q[1]]));
+    let (a, b) = (part("a.csv"), part("b.csv"));
+    refused(&source(&[&a, &b]), &robot, &["of all files side by side (2 of a.csv, 2 of b.csv)"]);
+}

@@ -149,6 +149,21 @@ fn a_robot_of_formulas_or_of_a_program_is_the_one_of_numbers() {
         let read = at(&["robot", "import", file, "--out", file.split_once('.').expect("a name").1]);
         assert!(read.status.success() && stderr(&read).contains("classic convention"), "{file}: {}", stderr(&read));
     }
+    // What became of its tool is said to those who want no notes, too.
+    for (tool, said) in [("SE3(0, 0, 0.1)", "is part of the robot file's [flange]"), ("grip(3)", "is LEFT OUT")] {
+        folder.file(
+            "tool.py",
+            format!(
+                "r = DHRobot([RevoluteDH(d=0.3, alpha=pi/2), RevoluteDH(a=-0.5), RevoluteDH(d=0.1)], tool={tool})\n"
+            ),
+        );
+        let read = at(&["robot", "import", "tool.py", "--out", "tool", "--force", "--quiet"]);
+        let words = stderr(&read);
+        assert!(
+            words.contains("the tool of line 1") && words.contains(said) && !words.contains("convention"),
+            "{words}"
+        );
+    }
     let expected = flanges("numbers");
     for out in ["csv", "md", "py"] {
         let most = flanges(out).iter().zip(&expected).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);

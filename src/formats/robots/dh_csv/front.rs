@@ -228,7 +228,7 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
         found.said += &format!(", counted the other way (flip): {}", flipped.join(", "));
     }
     found.ends = links.ends.map(|end| end.map(|end| end.in_mm(found.length_mm)));
-    found.said += &links.ends_said;
+    found.ends_said.clone_from(&links.ends_said);
     if links.limited && found.limits_deg.iter().any(Option::is_none) {
         found.said.push_str(", left out: qlim");
     }

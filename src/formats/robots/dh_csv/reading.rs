@@ -34,6 +34,8 @@ pub struct Reading {
     pub(super) flipped: Vec<bool>,
     /// What a toolbox puts before the first joint's frame, its base, and behind the last one's, its tool, mm.
     pub(super) ends: [Option<Transform>; 2],
+    /// What is said of these, each a sentence.
+    pub ends_said: Vec<String>,
     /// What the table's unit of lengths is in mm.
     pub(super) length_mm: f64,
     /// What was taken, for a sentence.

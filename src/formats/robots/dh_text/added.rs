@@ -44,7 +44,7 @@ pub(super) fn none(code: &str, links: &[Link]) -> Result<(), Wrong> {
 }
 
 /// Whether a text calls something of that name.
-fn calls(text: &str, call: &str) -> bool {
+pub(super) fn calls(text: &str, call: &str) -> bool {
     text.match_indices(call).any(|(at, _)| {
         let alone = !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
         alone && text[at + call.len()..].trim_start_matches(' ').starts_with('(')
@@ -52,7 +52,7 @@ fn calls(text: &str, call: &str) -> bool {
 }
 
 /// What is assigned to a name, each to the end of its statement.
-fn assigned<'a>(code: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
+pub(super) fn assigned<'a>(code: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
     let wanted = (!name.is_empty()).then(|| name.to_owned());
     let all = wanted.into_iter().flat_map(move |name| {
         let found = code.match_indices(name.as_str()).map(|(at, _)| at).collect::<Vec<_>>();

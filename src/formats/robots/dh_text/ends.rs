@@ -25,23 +25,23 @@ impl End {
 }
 
 /// Base and tool, and what is said of them.
-pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], String) {
-    let mut said = String::new();
-    let ends = ["base", "tool"].map(|name| {
+pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], Vec<String>) {
+    let mut said = Vec::new();
+    let ends = [("base", "base"), ("tool", "flange")].map(|(name, table)| {
         let (line, value, once) = told(code, name)?;
         let found = if once { product(code, known, value, 0) } else { None };
         match found {
             Some(transform) if transform == Transform::identity() => None,
             Some(transform) => {
-                said += &format!(", {name} of line {line}");
+                said.push(format!("the {name} of line {line} is part of the robot file's [{table}]"));
                 Some(End(transform))
             }
             None => {
                 let value = value.split_whitespace().collect::<Vec<_>>().join(" ");
-                said += &format!(
-                    ", LEFT OUT: the {name} of line {line}, `{value}`, which is no product of shifts and turns by numbers, or another line says it otherwise; write it into the robot file's [{}]",
-                    if name == "base" { "base" } else { "flange" }
-                );
+                said.push(format!(
+                    "the {name} of line {line}, `{value}`, is LEFT OUT: it is no product of shifts and turns by numbers, or another line says it \
+                     otherwise; write it into the robot file's [{table}]"
+                ));
                 None
             }
         }

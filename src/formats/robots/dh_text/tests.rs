@@ -271,16 +271,17 @@ fn base_and_tool_of_a_toolbox_are_taken_where_they_are_numbers() {
     let tool = tool.unwrap();
     assert_eq!(tool.translation.vector.as_slice(), [0.0, 100.0, 200.0]);
     assert!((tool.rotation.scaled_axis().z + PI / 2.0).abs() < 1e-12);
-    assert_eq!(said, ", base of line 8, tool of line 8");
+    assert_eq!(said.len(), 2);
+    assert!(said[0].contains("the base of line 8 is part of") && said[1].contains("the tool of line 8 is part of"));
     for nothing in ["manufacturer='x'", "base=base", "tool=None", "tool=SE3()"] {
-        assert_eq!(of(nothing), ([None; 2], String::new()), "{nothing}");
+        assert_eq!(of(nothing), ([None; 2], Vec::new()), "{nothing}");
     }
     let (ends, said) = of("tool=grip(3)");
-    assert!(ends == [None; 2] && said.contains("LEFT OUT: the tool of line 8, `grip(3)`"), "{said}");
+    assert!(ends == [None; 2] && said[0].starts_with("the tool of line 8, `grip(3)`, is LEFT OUT"), "{said:?}");
     // One of two arms, and which is meant is not known.
     let arms = "        if left:\n            self.base = SE3(0, 0.3, 0)\n        else:\n            self.base = SE3(0, -0.3, 0)\n";
     let two = read(&format!("{MODEL}{arms}"), false).unwrap().links.unwrap();
-    assert!(two.ends == [None; 2] && two.ends_said.contains("LEFT OUT: the base of line 12"), "{}", two.ends_said);
+    assert!(two.ends == [None; 2] && two.ends_said[0].contains("the base of line 12,"), "{:?}", two.ends_said);
     // Names, and what is told of the robot afterwards.
     let ends = |code: &str| read(code, false).unwrap().links.unwrap().ends;
     let named = MODEL
@@ -290,4 +291,35 @@ fn base_and_tool_of_a_toolbox_are_taken_where_they_are_numbers() {
     let matlab = "L(1) = Link('d', 0.1, 'a', 0.2);\nL(2) = Link('d', 0, 'a', 0.3);\nr = SerialLink(L, 'name', 'two', 'tool', transl(0, 0, 0.1));\nr.base = transl([0.5 0 0]);\n";
     let found = ends(&matlab.replace("0.5 0 0", "0.5, 0, 0"));
     assert_eq!(found.map(|e| e.map(|e| e.in_mm(1.0).translation.vector.sum())), [Some(0.5), Some(0.1)]);
+}
+
+/// A link that is made several times stands in the text once.
+#[test]
+fn repeated_links_are_written_out_or_refused_with_their_line() {
+    let count = |list: &str| {
+        let text = format!("first = RevoluteDH(d=0.1, alpha=pi/2)\nL = {list}\nr = DHRobot(L)\n");
+        read(&text, false).map(|text| text.links.map_or(0, |links| links.rows.len()))
+    };
+    let link = "RevoluteDH(a=0.3)";
+    assert_eq!(count(&format!("[{link}] + [{link}]*3")), Ok(1 + 1 + 3));
+    assert_eq!(count(&format!("[{link}, *[{link}, {link}] * 2]")), Ok(1 + 1 + 4));
+    assert_eq!(count(&format!("[{link}, RevoluteDH(a=0.2*3)]")), Ok(3));
+    for list in [
+        format!("[{link}] * n"),
+        format!("3 * [{link}]"),
+        format!("[{link}]*2*2"),
+        "[first]*3".to_owned(),
+        format!("[{link} for _ in range(3)]"),
+        format!("repmat({link}, 1, 3)"),
+        format!("[]\nfor _ in range(3):\n    L.append({link})"),
+        format!("[]\nfor _ in range(3):\n    if True:\n        L.append({link})"),
+        format!("[]\nfor _ in range(3): L.append({link})"),
+        format!("[]\nfor i=1:3\nL(i) = {link}\nend"),
+    ] {
+        let (line, message) = count(&list).unwrap_err();
+        assert!((2..=5).contains(&line) && message.contains("more often than they are written"), "{list}: {message}");
+    }
+    // A loop that ended, and one that only looks.
+    let after = format!("[{link}]\nfor i=1:3\nx = i;\nend\nL2 = {link}\nfor l in L:\n    print(l)");
+    assert_eq!(count(&after), Ok(3));
 }

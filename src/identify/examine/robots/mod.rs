@@ -160,7 +160,7 @@ const PLACING_ROUNDS: usize = 20;
 
 /// These rows without those that are far from the nominal links while most rows around them are not.
 fn without_lone(set: &Dataset, robot: &Robot, rows: Vec<usize>) -> Vec<usize> {
-    let Some(errors_mm) = shifted::Rows::new(set, robot, false).map(|rows| rows.errors_mm(PLACING_ROUNDS)) else {
+    let Some(errors_mm) = shifted::Rows::new(set, robot).map(|rows| rows.errors_mm(PLACING_ROUNDS)) else {
         return rows;
     };
     let limit_mm = FAR * median(errors_mm.iter().copied()).unwrap_or(f64::INFINITY).max(REPEATABILITY_MM);

@@ -31,7 +31,7 @@ fn intervals_of_few_poses_hold() {
             let (truth, rows) = rows(count, 0.05, true, seed);
             // The target is looked for from where another robot's file has it.
             let robot = Robot { tool_mm: truth.tool_mm + Vector3::new(30.0, -20.0, 40.0), ..truth.clone() };
-            let located = locate(&Dataset::new(&rows).unwrap(), &robot, EXACT, &Settings::default()).unwrap();
+            let located = locate(&Dataset::new(&rows).unwrap(), &robot, EXACT, None, &Settings::default()).unwrap();
             alarms += usize::from(located.fit.contradicted);
             let fresh = synthetic::planned(24, 0, 25.0, 0.0, 900 + seed, &|_| {});
             let joints: Vec<Vec<f64>> =
@@ -52,7 +52,7 @@ fn intervals_of_few_poses_hold() {
 #[test]
 fn three_points_alone_place_the_cameras_with_the_target_of_the_file() {
     let (truth, rows) = rows(3, 0.01, false, 5);
-    let located = locate(&Dataset::new(&rows).unwrap(), &truth, EXACT, &Settings::default()).unwrap();
+    let located = locate(&Dataset::new(&rows).unwrap(), &truth, EXACT, None, &Settings::default()).unwrap();
     assert!(!located.placed.target_found && !located.placed.oriented && !located.fit.contradicted);
     let off = located.placed.groups[0].1.translation.vector - synthetic::sensor(1).translation.vector;
     assert!(off.norm() < 0.5, "{off}");
@@ -65,8 +65,8 @@ fn a_robot_that_contradicts_the_points_is_said() {
         let nominal = Robot { tool_mm: truth.tool_mm, ..Robot::paper() };
         let trust = Trust { point_mm: REPEATABILITY_MM, rotation_rad: None };
         let set = Dataset::new(&rows).unwrap();
-        assert!(locate(&set, &nominal, trust, &Settings::default()).unwrap().fit.contradicted);
-        assert!(!locate(&set, &truth, trust, &Settings::default()).unwrap().fit.contradicted);
+        assert!(locate(&set, &nominal, trust, None, &Settings::default()).unwrap().fit.contradicted);
+        assert!(!locate(&set, &truth, trust, None, &Settings::default()).unwrap().fit.contradicted);
     }
 }
 
@@ -75,7 +75,7 @@ fn poses_that_tell_too_little_are_refused_with_what_is_open() {
     let (truth, all) = rows(6, 0.01, true, 7);
     let refused = |rows: &[Measurement]| {
         let set = Dataset::new(rows).unwrap();
-        locate(&set, &truth, EXACT, &Settings::default()).unwrap_err().to_string()
+        locate(&set, &truth, EXACT, None, &Settings::default()).unwrap_err().to_string()
     };
     assert!(refused(&all[..2]).contains("has 2 poses with a point; a placement takes 3"));
     // One axis turns: along it the cameras and the target may move together.
@@ -103,7 +103,7 @@ fn what_a_later_placement_leaves_open_is_named() {
         row.at.joints_deg[5] += 1e-6 * f64::from(k);
         all.push(row);
     }
-    let refused = locate(&Dataset::new(&all).unwrap(), &truth, EXACT, &Settings::default()).unwrap_err();
+    let refused = locate(&Dataset::new(&all).unwrap(), &truth, EXACT, None, &Settings::default()).unwrap_err();
     assert!(refused.to_string().contains("the cameras' turn about"), "{refused}");
 }
 
@@ -115,11 +115,60 @@ fn covariances_grow_by_what_the_scatter_of_few_poses_leaves_open() {
     let set = Dataset::new(&rows).unwrap();
     let placed = |point_mm: f64| {
         let trust = Trust { point_mm, rotation_rad: None };
-        locate(&set, &truth, trust, &Settings::default()).unwrap().placed
+        locate(&set, &truth, trust, None, &Settings::default()).unwrap().placed
     };
     let told = placed(1e-6);
     // The same scatter, but as one that is known.
     let known = placed((told.fresh_mm2 / 3.0).sqrt() * (1.0 + 1e-9));
     let grown = told.sensor_from_base(0).covariance.trace() / known.sensor_from_base(0).covariance.trace();
     assert!((grown - (3.182f64 / 1.960).powi(2)).abs() < 0.01, "{grown}");
+}
+
+/// Of a robot that was identified, what that left open moves placements and fresh points by more than the noise of the rows does.
+#[test]
+fn what_an_identification_left_open_is_in_the_intervals() {
+    let mut shares = Vec::new();
+    for known in [true, false] {
+        let (mut within, mut all) = ([0; 2], [0; 2]);
+        for seed in 0..60 {
+            let (truth, rows) = rows([4, 8, 12][seed as usize % 3], 0.01, true, seed);
+            let mut random = rand_pcg::Pcg64Mcg::new(u128::from(seed) + 5);
+            let parameters = truth.mdh_parameters();
+            // Twists and joints known to 0.3 mrad, lengths to 0.1 mm.
+            let sigma = |p: &Parameter| if p.unit() == crate::robot::Unit::Mm { 0.1 } else { 0.3 };
+            let sigmas: Vec<f64> = parameters.iter().map(sigma).collect();
+            let of_base = |p: &Parameter| is_held(*p, usize::MAX);
+            let drawn = parameters.iter().zip(&sigmas);
+            let off: Vec<f64> = drawn
+                .map(|(p, sigma)| if of_base(p) { 0.0 } else { sigma * synthetic::normal(&mut random).x })
+                .collect();
+            let robot = truth.shifted(&parameters, &off);
+            let covariance = DMatrix::from_diagonal(&DVector::from_vec(sigmas).map(|s| s * s));
+            let open = LeftOpen { parameters, covariance, freedom: 1e6, point_mm: 1e-3 };
+            let open = known.then_some(&open);
+            let trust = Trust { point_mm: 1.0, rotation_rad: Some(NOISE_RAD) };
+            let set = Dataset::new(&rows).unwrap();
+            let trust = if known { trust } else { EXACT };
+            let located = locate(&set, &robot, trust, open, &Settings::default()).unwrap();
+            assert_eq!(located.fit.robot_uncertain, known);
+            let placed = located.placed;
+            let (found, there) = (placed.sensor_from_base(0), synthetic::sensor(1));
+            let turn = (found.transform.rotation * there.rotation.inverse()).scaled_axis();
+            let shift = found.transform.translation.vector - there.translation.vector;
+            let numbers = turn.iter().chain(shift.iter()).enumerate();
+            all[0] += 6;
+            within[0] += numbers.filter(|(k, off)| off.abs() < 1.96 * found.covariance[(*k, *k)].sqrt()).count();
+            for row in rows.iter().map(|row| row.at.joints_rad()) {
+                let joints: Vec<f64> = row.iter().enumerate().map(|(j, q)| q + 0.2 * ((j + 1) as f64).sin()).collect();
+                let (point, covariance) = placed.points(0, &[&joints])[0];
+                let off = point - (there * truth.target_mm(&joints)).coords;
+                all[1] += 3;
+                within[1] += (0..3).filter(|&k| off[k].abs() < 1.96 * covariance[(k, k)].sqrt()).count();
+            }
+        }
+        shares.push([0, 1].map(|k| within[k] as f64 / f64::from(all[k])));
+    }
+    let [with, without] = shares[..] else { panic!() };
+    assert!(with.iter().all(|share| (0.91..0.99).contains(share)), "{with:?}");
+    assert!(without.iter().all(|share| *share < 0.8), "{without:?}");
 }
