@@ -98,9 +98,12 @@ impl Cell {
         ((1.0 - self.share) / 2.0).min(1.0 / self.square) * self.square_height_px()
     }
 
-    /// The least height of the squares with markers over the edges that meet at the corner, px. At a grid's border an edge is as long as a tag
-    /// one way and as a gap the other, and what is short in the picture may be either.
+    /// The least height of the squares with markers over the edges that meet at the corner, px. At the border of a grid of tags an edge is as
+    /// long as a tag one way and as a gap the other, and what is short in the picture may be either.
     fn square_height_px(&self) -> f64 {
+        if self.square <= 1.0 {
+            return self.side() * self.skew();
+        }
         let height = |marked: &Marked| {
             let at = (0..4).min_by(|a, b| marked.0[*a].norm().total_cmp(&marked.0[*b].norm())).unwrap_or(0);
             let [a, b] = [1, 3].map(|next| marked.0[(at + next) % 4] - marked.0[at]);

@@ -78,15 +78,13 @@ pub(super) fn none(code: &str, links: &[Link]) -> Result<(), Wrong> {
                 continue;
             };
             let behind = inside.get(up_to(inside, &[]) + 1..).unwrap_or("").trim_start();
-            let what = match (
-                behind.starts_with("for "),
-                behind.starts_with("for ") || in_loop(code, at),
-                in_repmat(code, at),
-            ) {
-                (true, ..) => "a comprehension",
-                (_, true, _) => "a loop",
-                (.., true) => "`repmat`",
-                _ => continue,
+            // Behind a whole statement a loop begins.
+            let in_brackets = code[..at].matches(['[', '(']).count() > code[..at].matches([']', ')']).count();
+            let what = match () {
+                () if in_brackets && behind.starts_with("for ") => "a comprehension",
+                () if in_loop(code, at) => "a loop",
+                () if in_repmat(code, at) => "`repmat`",
+                () => continue,
             };
             return Err(refused(code, at, what));
         }
