@@ -151,6 +151,20 @@ fn locate_finds_what_identify_found_and_names_a_robot_that_is_wrong() {
     for (a, b) in shift("out/placement.json").iter().zip(shift("there/placement.json")) {
         assert!((a - b).abs() < 1.0, "{a} {b}");
     }
+    // A record of a version that did not tell the scatter from the rest promises no more.
+    std::fs::write(at.join("six.csv"), rows(6)).unwrap();
+    let variance = || {
+        let six = ["locate", "six.csv", "--robot", "out/identified.toml", "--out", "there", "--force"];
+        let six = stereocal(at, &six);
+        assert_eq!(six.status.code(), Some(0), "{}{}", stdout(&six), stderr(&six));
+        json(&at.join("there/placement.json"))["groups"][0]["base_from_rig"]["covariance"][3][3].as_f64().unwrap()
+    };
+    let now = variance();
+    let mut record = json(&at.join("out/identification.json"));
+    record["expected"].as_object_mut().unwrap().remove("scatter_mm").unwrap();
+    std::fs::write(at.join("out/identification.json"), record.to_string()).unwrap();
+    let earlier = variance();
+    assert!(earlier >= now, "{earlier} {now}");
     let nominal = stereocal(at, &["locate", "truth/measurements.csv", "--robot", "robot.toml", "--out", "there"]);
     assert_eq!(nominal.status.code(), Some(1), "{}", stderr(&nominal));
     assert!(stdout(&nominal).contains("the points contradict this robot"), "{}", stdout(&nominal));

@@ -65,7 +65,7 @@ impl Identified {
 struct Expected {
     mean_mm: f64,
     #[serde(default)]
-    scatter_mm: f64,
+    scatter_mm: Option<f64>,
     p95_mm: f64,
     #[serde(default)]
     freedom: Option<f64>,
@@ -105,7 +105,9 @@ fn of_coordinate(mean_mm: f64) -> f64 {
 
 /// What the identification of a robot left open of it. `None` where nothing beside its file says so.
 pub fn left_open(file: &Utf8Path, robot: &Robot) -> Option<LeftOpen> {
-    let point_mm = of_coordinate(beside(file)?.expected?.scatter_mm);
+    let expected = beside(file)?.expected?;
+    // A record that does not tell the scatter from the rest tells no less than both.
+    let point_mm = of_coordinate(expected.scatter_mm.unwrap_or(expected.mean_mm));
     let Before { parameters, covariance, freedom, .. } = before(file, robot)?;
     Some(LeftOpen { parameters, covariance, freedom, point_mm })
 }
