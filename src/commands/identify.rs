@@ -53,6 +53,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let Examined { set, robot: nominal, along, findings, against, unexplained } =
         examine::examine(&as_read, &given, &settings, &|step| bar.begin(step));
     if unexplained.is_some() {
+        // What was mended on the way may have been mended because the cameras are on the hand.
         examine::in_hand::refuse(&as_read, &given)?;
         examine::in_hand::refuse(&set, &nominal)?;
     }

@@ -83,7 +83,7 @@ pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
     added::none(&code, &scan.links)?;
     // What a loop takes out of lists is read from the lists.
     if scan.wrong.is_none() {
-        repeated::none(&code, &scan.links)?;
+        repeated::refuse_unwritten(&code, &scan.links)?;
     }
     robots::of_one(&code, &scan.links.iter().map(|link| link.line).collect::<Vec<_>>())?;
     let known = std::mem::take(&mut scan.known);

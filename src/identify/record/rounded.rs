@@ -2,8 +2,9 @@
 //!
 //! In: joints and points as they were printed, and what the fit leaves. Out: joint angles so coarse that they account for what is left; and points
 //! that agree with the chain of links as closely as the digits go, so that nothing is left for an instrument or for how well an arm comes back.
-//! Method: a step of rounding, one for each power of ten where the same number of digits was written of all, has the variance of a uniform error, that of
-//! each joint through its lever; the fit's chi-squared against it. Goes wrong: a display that cuts digits off scatters no more, but shifts; averages of several readings stand on no step.
+//! Method: a step of rounding, one for each power of ten where the same number of digits was written of all, has the variance of a uniform error,
+//! that of each joint through its lever; the fit's chi-squared against it. Goes wrong: a display that cuts digits off scatters no more, but
+//! shifts; averages of several readings stand on no step.
 
 use std::collections::BTreeMap;
 

@@ -101,6 +101,7 @@ impl Cell {
     /// The least height of the squares with markers over the edges that meet at the corner, px. At the border of a grid of tags an edge is as
     /// long as a tag one way and as a gap the other, and what is short in the picture may be either.
     fn square_height_px(&self) -> f64 {
+        // Of a checkerboard every edge is a square's.
         if self.square <= 1.0 {
             return self.side() * self.skew();
         }

@@ -66,7 +66,7 @@ fn is_link(code: &str, name: &str) -> bool {
 }
 
 /// Refuses links that a loop, a comprehension or a copy makes.
-pub(super) fn none(code: &str, links: &[Link]) -> Result<(), Wrong> {
+pub(super) fn refuse_unwritten(code: &str, links: &[Link]) -> Result<(), Wrong> {
     if !links.iter().any(|link| link.call) {
         return Ok(());
     }
