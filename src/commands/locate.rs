@@ -67,14 +67,26 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let all = set.rows(|_| true);
     let held_out = folds::judged(&Judge::plain(&set, &all, false), &located.placed.robot, &all);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
-    let contradicted = || Check { advice: Advice::DoNotUse, reason: Fit::CONTRADICTED.to_owned(), mended: Vec::new() };
-    placement.check = located.fit.contradicted.then(contradicted).or(check);
+    placement.check = match check {
+        Some(Check { advice: Advice::DoNotUse, .. }) if !located.fit.contradicted => check,
+        check => of_points(&located.fit).or(check),
+    };
     let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;
     let summary = || report::located::summary(&content.placement, &content.fit, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
     let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
     Ok(Outcome { stdout, status: status.or_worse(heeded) })
+}
+
+/// What the points say of the robot's use; `None` where they agree with it.
+fn of_points(fit: &Fit) -> Option<Check> {
+    let (advice, reason) = match fit {
+        Fit { contradicted: true, .. } => (Advice::DoNotUse, Fit::CONTRADICTED),
+        Fit { doubted: true, .. } => (Advice::Check, Fit::DOUBTED),
+        _ => return None,
+    };
+    Some(Check { advice, reason: reason.to_owned(), mended: Vec::new() })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.

@@ -25,6 +25,9 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
     if fit.contradicted {
         lines.push(format!("do not use this placement: {}", Fit::CONTRADICTED));
     }
+    if fit.doubted {
+        lines.push(format!("check before you use this placement: {}", Fit::DOUBTED));
+    }
     for group in &placement.groups {
         let sensor = if placement.by_instrument { "instrument" } else { "rig" };
         lines.push(line(&format!("base from {sensor}, {}", group.group), &group.base_from_rig));

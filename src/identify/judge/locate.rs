@@ -7,20 +7,23 @@
 //! as the robot's file has it. Goes wrong: poses that leave a direction open are refused with that direction; a robot that is wrong in a
 //! way that a placement can take up is not seen.
 
+mod agreement;
+
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
-use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use self::agreement::{Agreement, Misfit, agreement, misfit};
 use super::placement::{Placed, is_held};
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::rows::Rows;
-use crate::identify::sensor::{Raw, Scatter};
+use crate::identify::sensor::Scatter;
 use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::task::Task;
-use crate::linear_algebra::{Eliminated, product, pseudo_inverse, without};
+use crate::linear_algebra::{Eliminated, product, without};
 use crate::robot::{Parameter, Robot};
 
 /// Fewest poses of a placement.
@@ -28,9 +31,6 @@ pub const FEWEST_POSES: usize = 3;
 
 /// What is not known to this, mm or mrad, is not determined: a tenth of a small arm's reach.
 const OPEN: f64 = 100.0;
-
-/// Chance that a robot that agrees is said to contradict the points.
-const FALSE_ALARM: f64 = 0.01;
 
 /// Quantile of the normal distribution for intervals of 95 %.
 const NORMAL_95: f64 = 1.959_963_984_540_054;
@@ -76,6 +76,8 @@ pub struct Fit {
     pub freedom: usize,
     /// Whether the points contradict the robot.
     pub contradicted: bool,
+    /// Whether they miss the robot by more than is known of it, and nothing tells whether robot or instrument is off.
+    pub doubted: bool,
     /// Whether what an identification left open of the robot is in the covariances; else the robot is taken as exact but for its scatter.
     pub robot_uncertain: bool,
 }
@@ -84,6 +86,10 @@ impl Fit {
     /// What points that contradict the robot mean.
     pub const CONTRADICTED: &str = "the points contradict this robot by more than is stated of both: identify the robot, or look whether cameras, \
                                     target and joint angles are those of these rows";
+
+    /// What it means where the instrument's noise is not known.
+    pub const DOUBTED: &str = "the points miss this robot by more than it is known to scatter, and these rows do not tell whether robot or \
+                               instrument is off: state the points' covariances, or take more poses";
 }
 
 /// Finds it; `open` where an identification says what it left open of this robot.
@@ -141,12 +147,19 @@ fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located,
     let placed = Placed::new(task.set, &rows, &of_all, &vec![0.0; of_all.len()], &shared, student);
     let mut placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
     placed.target_found = !task.parameters.is_empty();
-    let (chi_square, freedom, rms_mm) = misfit(task, trust, &offsets);
-    let contradicted =
-        ChiSquared::new(freedom as f64).is_ok_and(|law| law.cdf(chi_square) > 1.0 - FALSE_ALARM && freedom > 0);
-    let poses = task.set.poses.len();
-    let robot_uncertain = open.is_some();
-    Ok(Located { placed, fit: Fit { poses, rms_mm, chi_square, freedom, contradicted, robot_uncertain } })
+    let of_points = misfit(task, trust, &offsets);
+    let Misfit { chi_square, freedom, rms_mm } = of_points;
+    let agreement = agreement(task, trust, of_points);
+    let fit = Fit {
+        poses: task.set.poses.len(),
+        rms_mm,
+        chi_square,
+        freedom,
+        contradicted: agreement == Agreement::Contradicted,
+        doubted: agreement == Agreement::Doubted,
+        robot_uncertain: open.is_some(),
+    };
+    Ok(Located { placed, fit })
 }
 
 /// Rows, offsets and their covariance of a fit with a robot that was held, with what is open of the robot before the unknowns that were fitted: these
@@ -185,30 +198,6 @@ fn with_robot(
 fn student(freedom: f64) -> f64 {
     let quantile = StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(NORMAL_95, |t| t.inverse_cdf(0.975));
     (quantile / NORMAL_95).powi(2)
-}
-
-/// Squared residuals of points over what is stated of them and of the robot, with the target's place and the frames fitted to them alone; the
-/// degrees of freedom, and the root mean square of a residual.
-fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> (f64, usize, f64) {
-    let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(trust.point_mm) };
-    let rows = task.rows_at(scatter, task.robot);
-    let unknowns = task.parameters.len() + 6 * rows.blocks.len();
-    let (mut at, mut chi_square) = (offsets.to_vec(), f64::INFINITY);
-    for _ in 0..20 {
-        let (residuals, jacobian) = rows.evaluate(&at, true);
-        let cost = residuals.norm_squared();
-        if cost > chi_square * (1.0 - 1e-9) {
-            break;
-        }
-        chi_square = cost;
-        let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
-        at.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
-    }
-    let square =
-        |(_, _, raw): (usize, f64, Raw)| if let Raw::Point(off, _) = raw { Some(off.norm_squared()) } else { None };
-    let squares: Vec<f64> = rows.raw(&at).into_iter().filter_map(square).collect();
-    let rms = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
-    (chi_square, (3 * squares.len()).saturating_sub(unknowns), rms)
 }
 
 /// The direction of all unknowns together that is known least, in words, where it is as good as not known at all.

@@ -70,6 +70,34 @@ fn a_robot_that_contradicts_the_points_is_said() {
     }
 }
 
+/// An instrument about which nothing is stated may be as coarse as it is: only what a robot's geometry explains beyond that speaks against the robot.
+#[test]
+fn noise_that_nobody_stated_is_no_fault_of_the_robot() {
+    let trust = Trust { point_mm: REPEATABILITY_MM, rotation_rad: None };
+    let (mut doubts, mut doubts_of_right) = (Vec::new(), 0);
+    for (count, noise_mm) in [(6, 0.02), (6, 0.1), (12, 0.02), (12, 0.1), (30, 0.02), (30, 0.1)] {
+        let mut of_nominal = [0; 2];
+        for seed in 0..10 {
+            let (truth, mut rows) = rows(count, noise_mm, false, seed);
+            synthetic::state(&mut rows, |_| None);
+            let set = Dataset::new(&rows).unwrap();
+            let fit = |robot: &Robot| locate(&set, robot, trust, None, &Settings::default()).unwrap().fit;
+            let right = fit(&truth);
+            assert!(!right.contradicted, "{count} poses, {noise_mm} mm, seed {seed}");
+            doubts_of_right += usize::from(count == 30 && right.doubted);
+            let nominal = fit(&Robot { tool_mm: truth.tool_mm, ..Robot::paper() });
+            assert!(!(nominal.contradicted && nominal.doubted));
+            of_nominal[0] += usize::from(nominal.doubted);
+            of_nominal[1] += usize::from(nominal.contradicted);
+        }
+        // Six poses are as many as the geometry takes: nothing tells the two apart. None passes.
+        let expected = if count == 6 { [10, 0] } else { [0, 10] };
+        doubts.push((of_nominal, expected));
+    }
+    assert!(doubts.iter().all(|(found, expected)| found == expected), "{doubts:?}");
+    assert!(doubts_of_right <= 4, "{doubts_of_right} of 20 right robots");
+}
+
 #[test]
 fn poses_that_tell_too_little_are_refused_with_what_is_open() {
     let (truth, all) = rows(6, 0.01, true, 7);

@@ -1,0 +1,105 @@
+//! Whether points contradict the robot that they are placed with.
+//!
+//! In: the task of a placement, what is known of the robot, the offsets that were found. Out: how far the points miss the robot, and what that means.
+//! Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not, how well the instrument
+//! measures is what no change of the robot's geometry explains, and only what exceeds that and the robot's known scatter is its fault (an F test:
+//! the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains nothing beyond
+//! chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
+
+use super::Trust;
+use crate::identify::residuals::rows::Rows;
+use crate::identify::sensor::{Raw, Scatter};
+use crate::identify::settings::Model;
+use crate::identify::solve::task::Task;
+use crate::linear_algebra::{product, pseudo_inverse};
+
+/// Chance that a robot that agrees is said to contradict the points.
+const FALSE_ALARM: f64 = 0.01;
+
+/// Chance beyond which what the geometry explains of a misfit is not called noise.
+const EXPLAINED: f64 = 0.05;
+
+/// How far points miss a robot.
+#[derive(Debug, Clone, Copy)]
+pub struct Misfit {
+    /// Squared residuals over what is stated of the points and known of the robot.
+    pub chi_square: f64,
+    pub freedom: usize,
+    /// Root mean square of a point's residual, mm.
+    pub rms_mm: f64,
+}
+
+/// What that means of the robot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Agreement {
+    Agrees,
+    /// They miss it by more than is known of it, and nothing tells whether robot or instrument is off.
+    Doubted,
+    Contradicted,
+}
+
+/// With the target's place and the frames fitted to the points alone.
+pub fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> Misfit {
+    // Orientations weigh nothing.
+    let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(trust.point_mm) };
+    let rows = task.rows_at(scatter, task.robot);
+    fitted(&rows, offsets.to_vec(), |_, _| task.parameters.len())
+}
+
+/// What a misfit says of the robot.
+pub fn agreement(task: &Task, trust: Trust, found: Misfit) -> Agreement {
+    let freedom = found.freedom as f64;
+    let more_than_known = ChiSquared::new(freedom).is_ok_and(|law| law.cdf(found.chi_square) > 1.0 - FALSE_ALARM);
+    if !more_than_known {
+        return Agreement::Agrees;
+    }
+    if task.rows.iter().all(|&row| task.set.poses[row].reading.covariance_mm2().is_some()) {
+        return Agreement::Contradicted;
+    }
+    let geometry = task.robot.mdh_parameters();
+    let task = Task { parameters: &geometry, extras: &[], model: Model::Position, ..*task };
+    let rows = task.rows_at(Scatter::of_point(trust.point_mm), task.robot);
+    let explained = fitted(&rows, vec![0.0; geometry.len()], rank);
+    let (left, of_geometry) = (explained.freedom as f64, freedom - explained.freedom as f64);
+    let gain = (found.chi_square - explained.chi_square) / of_geometry / (explained.chi_square / left);
+    let noise = FisherSnedecor::new(of_geometry, left).is_ok_and(|law| law.cdf(gain) < 1.0 - EXPLAINED);
+    // With fewer numbers left than the geometry takes, little would be noticed.
+    if noise && left >= of_geometry {
+        return Agreement::Agrees;
+    }
+    // What the instrument's noise adds to a variance of one, the robot's own.
+    let expected = 1.0 + explained.chi_square / left;
+    let larger = FisherSnedecor::new(freedom, left)
+        .is_ok_and(|law| law.cdf(found.chi_square / freedom / expected) > 1.0 - FALSE_ALARM);
+    if larger { Agreement::Contradicted } else { Agreement::Doubted }
+}
+
+/// How many directions of the unknowns the residuals determine.
+fn rank(rows: &Rows, at: &[f64]) -> usize {
+    let (_, jacobian) = rows.evaluate(at, true);
+    let normal = product(&jacobian, &jacobian);
+    (pseudo_inverse(normal.clone()) * normal).trace().round() as usize
+}
+
+/// The residuals that are left at the best offsets, from these on.
+fn fitted(rows: &Rows, mut at: Vec<f64>, unknowns: impl Fn(&Rows, &[f64]) -> usize) -> Misfit {
+    let mut chi_square = f64::INFINITY;
+    for _ in 0..20 {
+        let (residuals, jacobian) = rows.evaluate(&at, true);
+        let cost = residuals.norm_squared();
+        if cost > chi_square * (1.0 - 1e-9) {
+            break;
+        }
+        chi_square = cost;
+        let step = pseudo_inverse(product(&jacobian, &jacobian)) * jacobian.tr_mul(&residuals);
+        at.iter_mut().zip(step.iter()).for_each(|(x, s)| *x -= s);
+    }
+    let square =
+        |(_, _, raw): (usize, f64, Raw)| if let Raw::Point(off, _) = raw { Some(off.norm_squared()) } else { None };
+    let squares: Vec<f64> = rows.raw(&at).into_iter().filter_map(square).collect();
+    let rms_mm = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
+    let fitted = unknowns(rows, &at) + 6 * rows.blocks.len();
+    Misfit { chi_square, freedom: (3 * squares.len()).saturating_sub(fitted), rms_mm }
+}
