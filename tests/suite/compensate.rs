@@ -486,6 +486,9 @@ fn what_compensate_wrote_is_not_corrected_again() {
     std::fs::create_dir(folder.path().join("mine")).unwrap();
     std::fs::copy(folder.path().join("once/compensated.csv"), folder.path().join("mine/targets.csv")).unwrap();
     run(folder.path(), &["mine/targets.csv", "--out", "thrice"], 0);
+    // A copy of what stands in the folder of results is known again.
+    let said = run(folder.path(), &["mine/targets.csv", "--out", "once", "--force"], 2);
+    assert!(said.contains("is what `compensate` wrote"), "{said}");
 }
 
 #[test]

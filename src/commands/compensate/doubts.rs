@@ -12,14 +12,17 @@ use crate::programs::{Language, unread};
 use crate::progress;
 use crate::robot::{Robot, file};
 
-/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them.
-pub(super) fn refuse_corrected(targets: &Utf8Path) -> Result<()> {
+/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them, or in one
+/// of these folders, where they are a copy.
+pub(super) fn refuse_corrected(targets: &Utf8Path, folders: &[&Utf8Path]) -> Result<()> {
     let folder = targets.parent().unwrap_or(Utf8Path::new(""));
     let above = folder.parent().unwrap_or(Utf8Path::new(".."));
     let written_by = |folder: &Utf8Path| Provenance::of_json(&folder.join("compensate.json"));
     let hash = Digested::read(targets).map(|digested| digested.sha256);
     let wrote = |run: &Provenance| run.outputs.iter().any(|output| Some(&output.sha256) == hash.as_ref());
-    let Some(run) = [folder, above].into_iter().filter_map(written_by).find(wrote) else { return Ok(()) };
+    let Some(run) = [folder, above].iter().chain(folders).copied().filter_map(written_by).find(wrote) else {
+        return Ok(());
+    };
     Err(config::Error::Usage {
         message: format!("{targets} is what `compensate` wrote ({}): its targets are corrected already", run.date),
         hint: format!("give the targets as they were written for the nominal robot; that run was `{}`", run.command),

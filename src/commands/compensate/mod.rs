@@ -5,6 +5,8 @@ mod pair;
 mod program;
 mod told;
 
+use camino::Utf8Path;
+
 use super::heed::heed;
 use super::{Outcome, Result};
 use crate::cli::Compensate;
@@ -22,7 +24,8 @@ use told::{Summary, said};
 
 /// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
-    doubts::refuse_corrected(&args.targets)?;
+    let results = args.output.out.as_deref().unwrap_or(&config.out);
+    doubts::refuse_corrected(&args.targets, &[results, args.identified.parent().unwrap_or(Utf8Path::new(""))])?;
     doubts::refuse_unread(&args.targets)?;
     let pair = Pair::read(args)?;
     doubts::of_nominal(&args.robot, &args.identified).iter().for_each(progress::warn);
@@ -38,7 +41,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
         Some(program) => program.rows(nominal, &order),
         None => targets::read(&args.targets, nominal)?,
     };
-    let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
+    let out = OutDir::open(results)?;
     let run = Run { force: args.output.force, ..run };
     let out = out.for_run(&run, &[&args.targets, &args.robot, &args.identified]);
     let program_name = format!("compensated/{}", args.targets.file_name().unwrap_or("program"));
