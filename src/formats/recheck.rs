@@ -7,7 +7,7 @@ use crate::diagnostic::Status;
 use crate::files::{self, OutDir, Result};
 use crate::imaging::Skipped;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
-use crate::stereo::recheck::{CauseSeen, Recheck};
+use crate::stereo::recheck::{CauseSeen, Recheck, Stray};
 
 /// The history's name in a results folder.
 pub const HISTORY: &str = "recheck.csv";
@@ -49,6 +49,13 @@ impl Standing {
         }
     }
 
+    /// The same where pairs contradict the calibration by themselves, and by what matters.
+    #[must_use]
+    pub fn beside(self, strays: &[Stray], tolerance_mm: f64) -> Standing {
+        let contradicted = strays.iter().any(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm);
+        if contradicted && self == Standing::StillValid { Standing::Undecided } else { self }
+    }
+
     /// With which status a check ends.
     pub fn status(self) -> Status {
         match self {
@@ -75,6 +82,8 @@ pub struct RecheckFile {
     against: String,
     pairs: Vec<String>,
     pairs_skipped: Vec<Skipped>,
+    /// Pairs that contradict the calibration by themselves.
+    pairs_contradicting: Vec<Stray>,
     /// The length that changes are given for.
     length_mm: f64,
     /// One or, not told apart, several with `|`; empty where nothing changed.
@@ -95,6 +104,7 @@ impl RecheckFile {
             against: against.to_string(),
             pairs: recheck.pairs.clone(),
             pairs_skipped: recheck.skipped.clone(),
+            pairs_contradicting: recheck.strays.clone(),
             length_mm: recheck.length_mm,
             cause: recheck.cause(),
             statement: recheck.statement(),

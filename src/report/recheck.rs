@@ -9,6 +9,7 @@ use super::table::{Table, with_sigma};
 use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
+use crate::imaging::corners::named;
 use crate::stereo::recheck::{CauseSeen, Recheck};
 
 /// The verdict in words.
@@ -42,6 +43,7 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64
         Standing::OwnData => {
             "the calibration was made of these pairs, which agree with it whatever happened since".to_owned()
         }
+        Standing::Undecided if !recheck.strays.is_empty() => contradicting(recheck),
         Standing::StillValid | Standing::Undecided => format!(
             "{found}; {} pairs would have shown a change that moves a length of {length} mm by {} mm, tolerance {tolerance_mm} mm",
             recheck.pairs.len(),
@@ -55,6 +57,37 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64
     }
 }
 
+/// What pairs mean that contradict the calibration by themselves.
+fn contradicting(recheck: &Recheck) -> String {
+    let pairs = &recheck.pairs;
+    let strays: Vec<String> = recheck.strays.iter().map(|stray| stray.pair.clone()).collect();
+    let strays = strays.as_slice();
+    let effect_mm = recheck.strays.iter().map(|stray| stray.effect_mm).fold(0.0, f64::max);
+    let by = format!("the calibration (a length of {} mm by up to {} mm)", recheck.length_mm, two_digits(effect_mm));
+    let last = pairs.ends_with(strays);
+    match (strays.len() == pairs.len(), last) {
+        (true, _) => {
+            "every pair contradicts the calibration, and no common change explains how: pictures that are turned, exchanged or not taken at one \
+             moment, another board, or a camera that is loose"
+                .to_owned()
+        }
+        (false, true) => format!(
+            "{} {by}, and the pairs before agree with it: the rig moved, or the two pictures were not taken at one moment",
+            subject(strays)
+        ),
+        (false, false) => format!(
+            "{} {by}, and the others agree with it: the two pictures were not taken at one moment, or the rig does not stand still",
+            subject(strays)
+        ),
+    }
+}
+
+/// The pairs with their verb.
+fn subject(strays: &[String]) -> String {
+    let (pairs, verb) = if strays.len() == 1 { ("pair", "contradicts") } else { ("pairs", "contradict") };
+    format!("{pairs} {} {verb}", named(strays))
+}
+
 /// By how much a cause changed, and within what: as many digits as that deserves.
 fn changed(cause: &CauseSeen) -> [String; 2] {
     let [amount, within] = with_sigma(cause.amount, 2.0 * cause.sigma);
@@ -62,8 +95,14 @@ fn changed(cause: &CauseSeen) -> [String; 2] {
 }
 
 /// What to do next.
-fn next(standing: Standing) -> &'static str {
+fn next(standing: Standing, recheck: &Recheck) -> &'static str {
     match standing {
+        Standing::Undecided if recheck.strays.len() == recheck.pairs.len() => {
+            "look at the pictures, then take three pairs of the board that calibrated: they say whether the rig changed"
+        }
+        Standing::Undecided if !recheck.strays.is_empty() => {
+            "clamp the cameras, and take three pairs more as the rig stands now: they say whether it moved"
+        }
         Standing::StillValid => "go on with this calibration: it is as good as it was",
         Standing::ChangedWithin => {
             "lengths are within the tolerance still; clamp the cameras, and calibrate anew before it grows"
@@ -85,7 +124,7 @@ pub fn summary(recheck: &Recheck, standing: Standing, tolerance_mm: f64, checks:
     lines.extend(
         recheck.skipped.iter().take(4).map(|skipped| format!("  without {}: {}", skipped.pair, skipped.reason)),
     );
-    lines.push(format!("next: {}", next(standing)));
+    lines.push(format!("next: {}", next(standing, recheck)));
     let mut table = Table::new(["cause", "changed by", "+- (95 %)", "would be seen", "mm of a length"]);
     for cause in &recheck.causes {
         let [amount, within] = changed(cause);
@@ -114,7 +153,7 @@ pub fn page(
         (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen"),
         (format!("{tolerance_mm} mm"), "tolerance"),
     ];
-    let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm, two_digits), next(standing));
+    let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm, two_digits), next(standing, recheck));
     let rows: Vec<Vec<String>> = recheck
         .causes
         .iter()

@@ -160,12 +160,12 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
             .map_err(|e| e.without(&skipped))?;
     let known = options.known.as_ref();
     let each_alone = known.is_none() && scatter.is_some();
-    let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout, &corners.board));
+    let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
     let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
         .solve(&layout)
         .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
-    let neighbours = solved.neighbours(&corners.board);
-    let inflation = solved.inflation(&corners.board);
+    let neighbours = solved.problem.neighbours();
+    let inflation = solved.inflation();
     let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(inflation);
     let without_scatter = by_noise.shared.clone();
     let print = print_share(&solved, &corners.board, &layout);

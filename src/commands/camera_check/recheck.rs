@@ -54,12 +54,13 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let warnings: Vec<String> =
         calibrated.doubts().into_iter().chain(other_size(&calibrated, &corners)).chain(of_own).collect();
     warnings.iter().for_each(progress::warn);
-    let Calibrated { rig, noise, pair_excess, pairs, volume, .. } = calibrated;
-    let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), pairs, volume };
+    let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, .. } = calibrated;
+    let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
     let found = recheck::recheck(&before, &corners)?;
 
     let standing =
         Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm).by(whole.is_some());
+    let standing = standing.beside(&found.strays, tolerance_mm);
     let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));

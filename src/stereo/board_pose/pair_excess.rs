@@ -4,11 +4,16 @@
 //! [`crate::stereo::board_pose::series`] finds of a run is compared with it. Pictures that were triggered have one, those of a board that is held by
 //! hand more. Method: Rao's score of a change of `right_from_left` at each pair, as for the poses of a run.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector6};
 
+use crate::imaging::Board;
+use crate::stereo::board_pose::answer::POSE_LIMIT;
 use crate::stereo::board_pose::print_share::{rig_basis, totals_of_pairs};
-use crate::stereo::board_pose::rig_change::consistency::{Change, of_member, of_usual};
+use crate::stereo::board_pose::rig_change::consistency::{Change, of_member, of_outsider, of_usual};
+use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::model::Layout;
+use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Two standard deviations of the excess of one pair that chance alone makes, as the median of many has it.
@@ -30,18 +35,55 @@ fn beyond_chance(each: &[Option<Change>]) -> f64 {
     Some(of_usual(each)).filter(|excess| *excess > chance).unwrap_or(1.0)
 }
 
+/// Beyond which a change at one pair or pose that lowers chi-square, over the usual excess, is no scatter of this rig: twice what the farthest pair did
+/// that the calibration used (the farthest of some is not the farthest of all), at least what chance does not.
+pub fn stray_limit(farthest_pair: Option<f64>) -> f64 {
+    const BEYOND: f64 = 2.0;
+    POSE_LIMIT.max(BEYOND * farthest_pair.unwrap_or(0.0))
+}
+
+/// The pairs that contradict a rig that they did not help to find, at the values of the problem, with the change of `right_from_left` at the pair alone
+/// that gains more than pairs of this rig are known to differ by. `rig` is the rig's covariance in the layout's order.
+pub fn strays(
+    problem: &Problem,
+    board: &Board,
+    layout: &Layout,
+    rig: &DMatrix<f64>,
+    (excess, farthest_pair): (f64, Option<f64>),
+) -> Vec<(usize, Vector6<f64>)> {
+    let gains = gains(problem, board, layout, of_outsider, |_| Some(rig.clone())).unwrap_or_default();
+    let beyond = |change: &Change| change.fall > stray_limit(farthest_pair) * excess;
+    let of_pair = |(pair, change): (usize, Option<Change>)| change.filter(beyond).map(|c| (pair, c.change));
+    gains.into_iter().enumerate().filter_map(of_pair).collect()
+}
+
 /// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own
 /// change, so that it is free beside the change; the board's shape is held.
 fn changes(calibration: &Calibration) -> Option<Vec<Option<Change>>> {
-    let Calibration { board, layout, views, values, priors, .. } = calibration;
+    let Calibration { board, layout, values, priors, .. } = calibration;
+    let known = priors.information(layout, &values.shared).matrix;
+    gains(&calibration.problem(), board, layout, of_member, |told| {
+        let (n, _) = told.shape();
+        invert(&(told + known.view((0, 0), (n, n))))
+    })
+}
+
+/// What a change at each pair alone would gain, beside what the rig's covariance leaves; that may follow from what all pairs say of the rig.
+fn gains(
+    problem: &Problem,
+    board: &Board,
+    layout: &Layout,
+    gain: fn(&Eliminated, &DMatrix<f64>) -> Option<Change>,
+    covariance: impl Fn(&DMatrix<f64>) -> Option<DMatrix<f64>>,
+) -> Option<Vec<Option<Change>>> {
     let basis = rig_basis(layout);
     let n = basis.ncols();
     let mut parts = Vec::new();
-    let totals = totals_of_pairs(views, values, board, &basis, |_, part| parts.push(part))?;
-    let known = priors.information(layout, &values.shared).matrix;
-    let rig = invert(&(totals.matrix.view((0, 0), (n, n)) + known.view((0, 0), (n, n))))?;
+    let totals = totals_of_pairs(&problem.views, &problem.values, board, &basis, |_, part| parts.push(part))?;
+    let rig = covariance(&totals.matrix.view((0, 0), (n, n)).into_owned())?;
+    // The board's shape is held.
     let size = totals.matrix.nrows();
-    let mut covariance = DMatrix::zeros(size, size);
-    covariance.view_mut((0, 0), (n, n)).copy_from(&rig);
-    Some(parts.iter().map(|part| of_member(part, &covariance)).collect())
+    let mut whole = DMatrix::zeros(size, size);
+    whole.view_mut((0, 0), (n, n)).copy_from(&rig);
+    Some(parts.iter().map(|part| gain(part, &whole)).collect())
 }

@@ -58,7 +58,7 @@ pub(super) fn totals_of_pairs(
 /// Finds the print. `None` where the views do not determine the shared numbers.
 pub fn print_share(solved: &Solved, board: &Board, layout: &Layout) -> Option<PrintShare> {
     let Problem { views, values, priors } = &solved.problem;
-    let (noise, inflation) = (&solved.noise, solved.inflation(board));
+    let (noise, inflation) = (&solved.noise, solved.inflation());
     let names = layout.names();
     let basis = rig_basis(layout);
     let rig_count = basis.ncols();

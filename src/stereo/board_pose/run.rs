@@ -8,6 +8,7 @@ use crate::measurements::RobotPose;
 use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Series};
+use crate::stereo::board_pose::pair_excess::stray_limit;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::flip::Flip;
@@ -66,12 +67,9 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// A change at one pose that lowers chi-square by more than this ends its measurement: twice what a pair did that the calibration used, at
-    /// least what chance does not.
+    /// A change at one pose that lowers chi-square by more than this ends its measurement.
     pub(super) fn pose_limit(&self) -> f64 {
-        /// The farthest of some pairs is not the farthest of all.
-        const BEYOND: f64 = 2.0;
-        POSE_LIMIT.max(BEYOND * self.farthest_pair.unwrap_or(0.0))
+        stray_limit(self.farthest_pair)
     }
 
     pub(super) fn usual(&self) -> Usual {

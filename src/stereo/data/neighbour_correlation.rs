@@ -11,7 +11,7 @@
 use nalgebra::{Point2, Vector2};
 use serde::Serialize;
 
-use crate::imaging::{Board, Side};
+use crate::imaging::Side;
 use crate::stereo::data::Observation;
 
 /// Standard errors beyond which a correlation is not chance.
@@ -35,16 +35,18 @@ pub struct NeighbourCorrelation {
 
 impl NeighbourCorrelation {
     /// Over all pictures; each item holds the active corners of one pair with their residuals, px.
-    pub fn of(board: &Board, views: impl Iterator<Item = Vec<(Observation, Vector2<f64>)>>) -> NeighbourCorrelation {
+    pub fn of(views: impl Iterator<Item = Vec<(Observation, Vector2<f64>)>>) -> NeighbourCorrelation {
         let mut sums = Sums::default();
         for residuals in views {
+            let largest = |of: fn(&Observation) -> usize| residuals.iter().map(|(o, _)| of(o) + 1).max().unwrap_or(0);
+            let (columns, rows) = (largest(|o| o.col), largest(|o| o.row));
             for side in Side::BOTH {
-                let mut at = vec![None; board.corner_count()];
+                let mut at = vec![None; columns * rows];
                 for (o, residual) in residuals.iter().filter(|(o, _)| o.side == side) {
                     // In units of its own scatter, but not turned as a whitener would.
-                    at[board.index(o.col, o.row)] = Some((o.px, residual * o.whitener.determinant().abs().sqrt()));
+                    at[o.row * columns + o.col] = Some((o.px, residual * o.whitener.determinant().abs().sqrt()));
                 }
-                sums.add(board, &at);
+                sums.add(columns, &at);
             }
         }
         sums.finish()
@@ -55,6 +57,15 @@ impl NeighbourCorrelation {
     pub fn inflation(&self) -> f64 {
         let sure = self.across > SURE * self.standard_error;
         if sure { 1.0 + self.across.min(WHOLE_OVERLAP) * self.links_per_corner } else { 1.0 }
+    }
+
+    /// How many corners say the same, where the correlation falls with each further row and column as it does to the next: the integral of such a
+    /// correlation, (1 + r) / (1 - r) in each direction. One where none shows.
+    pub fn corners_alike(&self) -> f64 {
+        /// Of a picture whose corners all go together; what is left then is one number a picture.
+        const MOST: f64 = 0.95;
+        let r = (0.5 * (self.along + self.across)).min(MOST);
+        if r > SURE * self.standard_error { ((1.0 + r) / (1.0 - r)).powi(2) } else { 1.0 }
     }
 }
 
@@ -68,22 +79,21 @@ struct Sums {
 }
 
 impl Sums {
-    fn add(&mut self, board: &Board, at: &[Option<(Point2<f64>, Vector2<f64>)>]) {
+    /// A picture's corners, row by row.
+    fn add(&mut self, columns: usize, at: &[Option<(Point2<f64>, Vector2<f64>)>]) {
         self.corners += at.iter().flatten().count();
-        for row in 0..board.rows() {
-            for col in 0..board.columns() {
-                let Some((here_px, here)) = at[board.index(col, row)] else { continue };
-                let right = (col + 1 < board.columns()).then(|| board.index(col + 1, row));
-                let below = (row + 1 < board.rows()).then(|| board.index(col, row + 1));
-                for (there_px, there) in [right, below].into_iter().flatten().filter_map(|i| at[i]) {
-                    let Some(t) = (there_px - here_px).try_normalize(0.0) else { continue };
-                    let n = Vector2::new(-t.y, t.x);
-                    self.links += 1;
-                    for (sums, v) in [(&mut self.along, t), (&mut self.across, n)] {
-                        let (a, b) = (here.dot(&v), there.dot(&v));
-                        sums.0 += a * b;
-                        sums.1 += 0.5 * (a * a + b * b);
-                    }
+        for (i, here) in at.iter().enumerate() {
+            let Some((here_px, here)) = here else { continue };
+            let right = ((i + 1) % columns > 0).then_some(i + 1);
+            let below = Some(i + columns).filter(|below| *below < at.len());
+            for (there_px, there) in [right, below].into_iter().flatten().filter_map(|i| at[i]) {
+                let Some(t) = (there_px - here_px).try_normalize(0.0) else { continue };
+                let n = Vector2::new(-t.y, t.x);
+                self.links += 1;
+                for (sums, v) in [(&mut self.along, t), (&mut self.across, n)] {
+                    let (a, b) = (here.dot(&v), there.dot(&v));
+                    sums.0 += a * b;
+                    sums.1 += 0.5 * (a * a + b * b);
                 }
             }
         }

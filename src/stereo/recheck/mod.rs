@@ -11,12 +11,13 @@
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector6};
 use serde::Serialize;
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
+use crate::stereo::board_pose::pair_excess;
 use crate::stereo::data::{Noise, View, in_use};
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
 use crate::stereo::init::board_pose::{self, misfit_px};
@@ -50,6 +51,8 @@ pub struct Before {
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: f64,
+    /// How far the pair disagreed that did most, over that, where its file says so.
+    pub farthest_pair: Option<f64>,
     /// How many pairs with poses of their own made it, where its file says so.
     pub pairs: Option<usize>,
     /// The volume that it was checked for; that of the new boards where its file does not say.
@@ -76,6 +79,14 @@ pub struct CauseSeen {
     pub seen_mm: f64,
 }
 
+/// A pair that contradicts the old rig by itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Stray {
+    pub pair: String,
+    /// By how much a rig that agrees with it has another length, mm.
+    pub effect_mm: f64,
+}
+
 /// What explains a change.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Explained {
@@ -94,6 +105,8 @@ pub struct Recheck {
     pub pairs: Vec<String>,
     /// Pairs that were not, and why.
     pub skipped: Vec<Skipped>,
+    /// Of those compared, pairs that contradict the old rig by themselves: what few of them say is lost among the others.
+    pub strays: Vec<Stray>,
     /// Length that changes are given for, mm.
     pub length_mm: f64,
     /// Every cause.
@@ -121,7 +134,7 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let layout =
         Layout { left: Some(before.rig.left.lens), right: Some(before.rig.right.lens), transform: true, shape: true };
     let solved = problem.solve(&layout)?;
-    let [scatter, beyond] = scatter_beside(&solved, &layout, &corners.board, before.pair_excess, before.noise.as_ref());
+    let [scatter, beyond] = scatter_beside(&solved, &layout, before.pair_excess, before.noise.as_ref());
     let trial = Trial::new(&solved.problem, layout).ok_or_else(Error::undetermined)?;
     let numbers = layout.shape_start();
     let old = before.covariance(&layout).ok_or(Error::NoCovariance)?;
@@ -160,7 +173,37 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     };
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = views.iter().map(|view| view.pair.clone()).collect();
-    Ok(Recheck { pairs, skipped, length_mm, causes, change, effect_mm, seen_mm })
+    let place = hypothesis::any_place(&compared);
+    let effect_mm_of = |change: Vector6<f64>| moves(&place.iter().zip(&change).map(|(by, amount)| by * *amount).sum());
+    let strays = strays(before, &solved, &problem.values, &layout, &corners.board)
+        .into_iter()
+        .map(|(i, change)| Stray { pair: views[i].pair.clone(), effect_mm: effect_mm_of(change) })
+        .collect();
+    Ok(Recheck { pairs, skipped, strays, length_mm, causes, change, effect_mm, seen_mm })
+}
+
+/// The pairs that contradict the old rig by themselves, with the new board's shape and corners that scatter as those of the calibration did, or
+/// these more.
+fn strays(
+    before: &Before,
+    solved: &Solved,
+    old: &Values,
+    layout: &Layout,
+    board: &Board,
+) -> Vec<(usize, Vector6<f64>)> {
+    let mut problem = solved.problem.clone();
+    problem.values = old.clone();
+    problem.values.shared.shape_mm = solved.shared().shape_mm;
+    let typical_px = |noise: &Noise| noise.typical_px(&solved.problem.views);
+    let noise = before.noise.filter(|then| typical_px(then) > typical_px(&solved.noise)).unwrap_or(solved.noise);
+    // Without what a robust loss makes of corners that lie far off.
+    noise.apply(&mut problem.views);
+    for (pose, view) in problem.values.poses.iter_mut().zip(&problem.views) {
+        *pose = board_pose::follow(&problem.values.shared, view, *pose).unwrap_or(*pose);
+    }
+    let Some(rig) = before.covariance(layout) else { return Vec::new() };
+    let usual = (before.pair_excess, before.farthest_pair);
+    pair_excess::strays(&problem, board, layout, &rig, usual)
 }
 
 /// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the other side.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geometry::transform;
-use crate::stereo::board_pose::pair_excess::pair_excess;
+use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::World;
@@ -20,6 +20,7 @@ fn before(found: &Calibration, pair_excess: f64, pairs: usize) -> Before {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
         pair_excess,
+        farthest_pair: farthest_pair(found),
         pairs: Some(pairs),
         volume: Some(Volume::of(found, Extent::Boards)),
     }
@@ -57,6 +58,21 @@ fn a_rig_that_stands_is_said_to_stand() {
     assert!((0..6).all(|seed| recheck(&calibrated(seed), &after(seed, |_| {})).unwrap().change.is_none()));
 }
 
+/// One pair of a rig that moved just before it is lost among the others, whose corners a robust fit believes.
+#[test]
+fn a_pair_that_contradicts_the_others_is_named() {
+    let before = calibrated(41);
+    for turn_deg in [0.02, 0.2] {
+        let mut corners = after(41, |_| {});
+        assert!(recheck(&before, &corners).unwrap().strays.is_empty());
+        corners.pairs[2] = after(41, |rig| turned(rig, turn_deg)).pairs.swap_remove(2);
+        let found = recheck(&before, &corners).unwrap();
+        let strays: Vec<&String> = found.strays.iter().map(|stray| &stray.pair).collect();
+        assert_eq!(strays, [&corners.pairs[2].pair], "{turn_deg} deg: {}", found.statement());
+        assert!(found.strays[0].effect_mm > turn_deg, "{turn_deg} deg: {:?}", found.strays);
+    }
+}
+
 #[test]
 fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
     // Boards that hardly lean leave lens and place of the cameras in a bent valley.
@@ -85,9 +101,9 @@ fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
 fn pairs_that_contradict_each_other_tell_no_absurd_change() {
     // Boards that hardly lean, and one pair in three whose pictures were taken farther apart in time than the others': in one of these
     // worlds the pairs' own rig has a focal length that is 4 % off.
-    for apart_deg in [0.1, 0.2] {
-        for seed in 87..90 {
-            let before = by_hand(seed, 20, 1.0, 0.05);
+    for seed in 87..90 {
+        let before = by_hand(seed, 20, 1.0, 0.05);
+        for apart_deg in [0.1, 0.2] {
             let mut world = World::new(3, seed + 1000);
             leaning_by(&mut world, 0.3);
             let mut corners = world.corners_by_hand(seed + 1000, 0.05);

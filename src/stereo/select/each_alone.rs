@@ -74,7 +74,7 @@ fn one(start: &Problem, board: &Board, lens: Lens, side: Side) -> Option<Alone> 
     let problem = Problem { views, values: Values { shared, poses }, priors };
     let alone = |shape| Layout { shape, ..Layout::one_camera(lens) };
     let (solved, layout) = problem.solve_bent_or_flat(None, alone).ok()?;
-    let scatter = stated_uncertainty::excess_scatter(&solved, &layout, board);
+    let scatter = stated_uncertainty::excess_scatter(&solved, &layout);
     let count = layout.camera_count(Side::Left);
     let covariance = solved.uncertainty(&layout).ok()?.shared.view((0, 0), (count, count)) * scatter;
     Some(Alone { camera: solved.shared().rig.left, covariance, scatter_px: scatter_px(&solved) })

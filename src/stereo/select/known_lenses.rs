@@ -11,7 +11,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
-use crate::imaging::{Board, Side};
+use crate::imaging::Side;
 use crate::stereo::data::in_use;
 use crate::stereo::model::{KnownLenses, Layout};
 use crate::stereo::pairs::Cause;
@@ -65,12 +65,11 @@ impl LensCheck {
 }
 
 /// What is free beside lenses that are known, and what is expected.
-pub fn choose(start: &Problem, board: &Board, known: &KnownLenses, options: &Options) -> Result<Choice, Error> {
+pub fn choose(start: &Problem, known: &KnownLenses, options: &Options) -> Result<Choice, Error> {
     let lens = options.lens.unwrap_or(SIMPLEST);
     let problem = start_of(start, known);
     let (mut solved, layout) = problem.solve_bent_or_flat(options.shape, |shape| known.layout(lens, shape))?;
-    let [scatter, _] =
-        stated_uncertainty::scatter_beside(&solved, &layout, board, known.pair_excess, known.noise.as_ref());
+    let [scatter, _] = stated_uncertainty::scatter_beside(&solved, &layout, known.pair_excess, known.noise.as_ref());
     // Corners weigh by their noise alone; beside them, what is known counts by as much more as the pairs scatter beyond it.
     solved.problem.priors = start.priors.knowing(&known.weighing(scatter));
     let shape = options
@@ -103,11 +102,11 @@ fn is_bent(problem: &Problem, bent: &Layout, flat: &Layout, scatter: f64) -> boo
 }
 
 /// Compares the known lenses with what the pictures say by themselves. `None` where they say nothing.
-pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout, board: &Board) -> Option<LensCheck> {
+pub fn check(start: &Problem, known: &KnownLenses, layout: &Layout) -> Option<LensCheck> {
     let own = Problem { priors: start.priors.knowing(&known.loosened()), ..start_of(start, known) };
     let solved = own.solve(layout).ok()?;
     let [scatter, beyond] =
-        stated_uncertainty::scatter_beside(&solved, layout, board, known.pair_excess, known.noise.as_ref());
+        stated_uncertainty::scatter_beside(&solved, layout, known.pair_excess, known.noise.as_ref());
     let trial = Trial::new(&solved.problem, *layout)?;
     let places: Vec<usize> = known.numbers().iter().map(|(side, at)| layout.camera_start(*side) + at).collect();
     let all = layout.numbers(&trial.values.shared);

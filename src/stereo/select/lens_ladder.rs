@@ -25,7 +25,7 @@ use crate::stereo::{Error, Lens};
 /// where that may decide.
 pub fn choose(start: &Problem, missed: Option<Missed>, board: &Board, options: &Options) -> Result<Choice, Error> {
     if let Some(known) = &options.known {
-        return known_lenses::choose(start, board, known, options);
+        return known_lenses::choose(start, known, options);
     }
     let of_pairs = of_pairs(start, board, options);
     let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
@@ -37,7 +37,7 @@ pub fn choose(start: &Problem, missed: Option<Missed>, board: &Board, options: &
     let paired = of_pairs.as_ref().ok().and_then(of);
     let Some(known) = each_alone::lenses(start, board, lens, paired.as_ref(), missed) else { return of_pairs };
     let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
-    let choice = known_lenses::choose(start, board, &known, options)?;
+    let choice = known_lenses::choose(start, &known, options)?;
     // How the pairs scatter, these pairs tell themselves.
     let scatter = choice.scatter.map(|scatter| KnownScatter { pairs: 1.0, ..scatter });
     Ok(Choice { scores, scatter, ..choice })
@@ -60,7 +60,7 @@ fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice,
     if let Some(wide) = of_wide_lens(start, &solved, &layout) {
         solved = wide;
     }
-    let scatter = stated_uncertainty::excess_scatter(&solved, &layout, board);
+    let scatter = stated_uncertainty::excess_scatter(&solved, &layout);
     let mut chance = Chance { scatter, print: print_excess(&solved, &layout, board) };
     // The lens is compared with the board bent, if it may be: a bow that is left out would look like a lens.
     let mut scores = ladder(&solved.problem, layout.shape, &chance, &[]);
@@ -106,7 +106,7 @@ fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &
         |Trial { layout, values, priors, .. }| {
             let near = Problem { views: problem.views.clone(), values: values.clone(), priors: priors.clone() };
             let full = near.solve_near(layout).ok()?;
-            let scatter = stated_uncertainty::told_scatter(&full, layout, board)?;
+            let scatter = stated_uncertainty::told_scatter(&full, layout)?;
             let told =
                 Chance { scatter, print: print_excess(&full, layout, board) }.with_taken_up(layout.count(), pairs);
             let beyond = scatter / (1.0 + BY_CHANCE / (pairs as f64).sqrt());

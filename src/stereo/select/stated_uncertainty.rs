@@ -8,7 +8,6 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::imaging::Board;
 use crate::statistics::chi_square_quantile;
 use crate::stereo::data::Noise;
 use crate::stereo::model::{Layout, Shared};
@@ -80,29 +79,23 @@ pub fn state(
 
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the
 /// corners. `None` where the pairs do not tell how they scatter.
-pub fn told_scatter(solved: &Solved, layout: &Layout, board: &Board) -> Option<f64> {
-    let inflation = solved.inflation(board);
+pub fn told_scatter(solved: &Solved, layout: &Layout) -> Option<f64> {
+    let inflation = solved.inflation();
     let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
     let ratio = scattered(solved, layout, &by_noise.shared, inflation, [1.0; 2])?.2.ratio?;
     Some(inflation * ratio.max(1.0))
 }
 
 /// The same, by the corners alone where the pairs do not tell.
-pub fn excess_scatter(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
-    told_scatter(solved, layout, board).unwrap_or_else(|| solved.inflation(board))
+pub fn excess_scatter(solved: &Solved, layout: &Layout) -> f64 {
+    told_scatter(solved, layout).unwrap_or_else(|| solved.inflation())
 }
 
 /// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of the rig knows it, whichever is
 /// larger, and the same over what their corners' noise lets expect.
-pub fn scatter_beside(
-    solved: &Solved,
-    layout: &Layout,
-    board: &Board,
-    pair_excess: f64,
-    noise: Option<&Noise>,
-) -> [f64; 2] {
-    let scatter = excess_scatter(solved, layout, board).max(pair_excess) * solved.noise_of(noise);
-    [scatter, scatter / solved.inflation(board)]
+pub fn scatter_beside(solved: &Solved, layout: &Layout, pair_excess: f64, noise: Option<&Noise>) -> [f64; 2] {
+    let scatter = excess_scatter(solved, layout).max(pair_excess) * solved.noise_of(noise);
+    [scatter, scatter / solved.inflation()]
 }
 
 /// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
@@ -196,7 +189,7 @@ mod tests {
         let told = |world: &World| {
             let found = calibrate(&world.corners(1), &BROWN4).ok()?;
             let solved = found.problem().solve(&found.layout).ok()?;
-            Some(told_scatter(&solved, &found.layout, &world.board))
+            Some(told_scatter(&solved, &found.layout))
         };
         assert!(told(&World::new(12, 3)).unwrap().is_some_and(|scatter| scatter >= 1.0));
         // Nearly parallel boards: with all of them the focal lengths are known somewhat, without one they are not.

@@ -5,7 +5,6 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use crate::imaging::Board;
 use crate::stereo::Error;
 use crate::stereo::data::residuals;
 use crate::stereo::data::{NeighbourCorrelation, Noise, Observation, View};
@@ -106,11 +105,23 @@ impl Problem {
         residuals::active(&self.views, &self.values).ok_or_else(unseen)
     }
 
+    /// How corners scatter at these values.
+    fn likeliest(&self, unknowns: usize) -> Result<(Noise, Loss), Error> {
+        let alike = self.neighbours().corners_alike();
+        Ok(Noise::likeliest(&self.left()?, unknowns, alike))
+    }
+
+    /// How the residuals of neighbouring corners hang together.
+    pub fn neighbours(&self) -> NeighbourCorrelation {
+        let of_view = |(view, pose)| residuals::of_view(&self.values.shared, view, pose);
+        NeighbourCorrelation::of(self.views.iter().zip(&self.values.poses).map(of_view))
+    }
+
     /// Solves from values near the minimum: without the robust search.
     pub fn solve_near(&self, layout: &Layout) -> Result<Solved, Error> {
         let mut problem = self.with_layout(layout);
         let unknowns = layout.count() + 6 * problem.views.len();
-        let (mut noise, mut loss) = Noise::likeliest(&problem.left()?, unknowns);
+        let (mut noise, mut loss) = problem.likeliest(unknowns)?;
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut problem.views);
             // With a robust loss the last word is that of the weighted squares below.
@@ -119,7 +130,7 @@ impl Problem {
                 _ => problem.search(layout, loss, Search::ROBUST).values,
             };
             let before = (noise, loss);
-            (noise, loss) = Noise::likeliest(&problem.left()?, unknowns);
+            (noise, loss) = problem.likeliest(unknowns)?;
             let moved = |a: f64, b: f64| (a - b).abs() > 1e-4 * b;
             if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
@@ -151,16 +162,9 @@ impl Problem {
 }
 
 impl Solved {
-    /// How the residuals of neighbouring corners hang together.
-    pub fn neighbours(&self, board: &Board) -> NeighbourCorrelation {
-        let Problem { views, values, .. } = &self.problem;
-        let of_view = |(view, pose)| residuals::of_view(&values.shared, view, pose);
-        NeighbourCorrelation::of(board, views.iter().zip(&values.poses).map(of_view))
-    }
-
     /// Variance of the unknowns over what the weighted normal equations say: what neighbouring corners share, and the loss.
-    pub fn inflation(&self, board: &Board) -> f64 {
-        self.neighbours(board).inflation() * self.loss_factor
+    pub fn inflation(&self) -> f64 {
+        self.problem.neighbours().inflation() * self.loss_factor
     }
 
     /// Covariance of everything; an error where the views do not tell.

@@ -7,7 +7,7 @@ use stereocal::imaging::Corners;
 use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::world::World;
 use stereocal::stereo::Rig;
-use stereocal::stereo::board_pose::pair_excess::pair_excess;
+use stereocal::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::findings::hypothesis;
 use stereocal::stereo::model::board_shape::FLAT;
@@ -50,6 +50,7 @@ fn before(seed: u64, noise: Noise, loose_deg: f64) -> Option<Before> {
         rig: found.rig().clone(),
         noise: Some(found.own_noise),
         pair_excess: pair_excess(&found),
+        farthest_pair: farthest_pair(&found),
         pairs: Some(found.pair_scatter.groups),
         volume: Some(Volume::of(&found, Extent::Boards)),
     })
@@ -104,12 +105,12 @@ fn one(seed: u64, pairs: usize, noise: Noise, loose_deg: f64) -> Option<(Count, 
     Some((none, counts.collect()))
 }
 
-pub fn run(rigs: u64) {
+pub fn run(rigs: u64, wanted: &str) {
     println!(
         "\n{rigs} rigs a line, calibrated by {PAIRS} pairs, and other pairs after a change of so many times the size that is said to be seen: \
          seen % (named by the cause %, by another one %; what is left is of unknown cause)"
     );
-    for (scene, noise, loose_deg) in SCENES {
+    for (scene, noise, loose_deg) in SCENES.into_iter().filter(|(scene, ..)| scene.contains(wanted)) {
         for pairs in [3, 5] {
             let each: Vec<_> =
                 (0..rigs).into_par_iter().filter_map(|seed| one(seed, pairs, noise, loose_deg)).collect();

@@ -145,7 +145,8 @@ fn told(each: &[Option<One>], cause: Option<Cause>) -> String {
     )
 }
 
-pub fn run() {
+/// With cameras of so many pixels alone, where it is said.
+pub fn run(size_px: Option<u64>) {
     println!(
         "\n{RIGS} rigs a line, lenses of another day (brown4, tight: of {} pairs, loose: of {}): how many are contradicted, named by their cause, \
          and by it alone; the change of focus said to be seen; the rig's share of the error of 70 mm on fresh boards, RMS, also over what the \
@@ -155,7 +156,7 @@ pub fn run() {
     println!(
         "px    corners px  lenses  pairs  they are              | contradicted  named  alone  refused | focus seen % | 70 mm um  over bound  within 95 %"
     );
-    for noise in CAMERAS {
+    for noise in CAMERAS.into_iter().filter(|noise| size_px.is_none_or(|px| noise.size_px as u64 == px)) {
         for (how, known_pairs) in KNOWN {
             let of_day = |seed| known(seed, known_pairs, noise);
             let all: Vec<Option<KnownLenses>> = (0..RIGS).into_par_iter().map(of_day).collect();

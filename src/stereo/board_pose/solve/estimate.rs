@@ -138,7 +138,7 @@ pub fn estimate<'a>(
                 at_least(usual.noise, Noise::from_mean(&active.concat(), unknowns))
             }
         };
-        inflation = NeighbourCorrelation::of(bundle.board, active.into_iter()).inflation();
+        inflation = NeighbourCorrelation::of(active.into_iter()).inflation();
         let close = |a: f64, b: f64| (a - b).abs() <= SETTLED * b.abs().max(1e-5);
         let settled = close(before.0.added_px, noise.added_px)
             && close(before.0.factor, noise.factor)
