@@ -71,6 +71,12 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
             "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these do not rule out a change as large as the tolerance"
         }
         Standing::OwnData => "measure ten new poses",
+        _ if !recheck.changed && !recheck.instead.is_empty() => {
+            "add poses spread over the workspace, which bend every joint and turn the wrist, and check with them: they tell the robot from what measures it; until then use neither"
+        }
+        _ if !recheck.changed && !recheck.is_same() => {
+            "`stereocal locate` finds the placement anew; add poses spread over the workspace, which bend every joint and turn the wrist: they tell whether the robot stays"
+        }
         _ if !recheck.changed && recheck.by_cameras => "`stereocal locate` finds the cameras anew; the robot stays",
         _ if !recheck.changed => "`stereocal locate` finds the instrument's placement anew; the robot stays",
         Standing::ChangedWithin => {

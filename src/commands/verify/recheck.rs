@@ -61,9 +61,9 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let warnings: Vec<String> =
         advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).chain(beyond).collect();
     warnings.iter().for_each(progress::warn);
-    let found = compared((&set, &robot), against, &before, &placed)?;
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
+    let found = Recheck { tolerance_mm, ..compared((&set, &robot), against, &before, &placed)? };
     let content = RobotRecheckFile::new(&found, against, tolerance_mm, whole.is_some() || own.all);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
@@ -96,9 +96,9 @@ fn of_targets(rows: &[Measurement], against: &Utf8Path) -> std::result::Result<D
     }
 }
 
-/// Whether the robot changed, by these rows. Where rows are outside of the ranges that it was identified in, a change that its model may lack there,
-/// nothing single or the zero of a joint that is outside, is none where the other rows do not show it as well, and it is no more than what was
-/// corrected of the robot.
+/// Whether the robot changed, or what measured it moved, by these rows. Where rows are outside of the ranges that it was identified in, that is open where
+/// the other rows do not show it as well, and it is no more than what the model may lack there: it goes where the terms beyond the links are as
+/// uncertain as they are large, or it is nothing single or the zero of a joint that is outside, and no more than what was corrected of the robot.
 fn compared(
     (set, robot): (&Dataset, &Robot),
     against: &Utf8Path,
@@ -111,12 +111,16 @@ fn compared(
     let Outside { joints, rows } = beyond::outside(against, robot, set, &set.rows(|_| true));
     let is_outside = |cause: &str| joints.iter().any(|(joint, _)| cause == format!("joint-{}", joint + 1));
     let is_lacking = found.likeliest.is_empty() || found.likeliest.iter().any(|(cause, _)| is_outside(cause));
-    if !found.changed || joints.is_empty() || !is_lacking || found.effect_mm > found.correction_mm {
+    let is_small = found.changed && is_lacking && found.effect_mm <= found.correction_mm;
+    let outside: Vec<usize> = joints.iter().map(|(joint, _)| *joint).collect();
+    let goes = || recheck(set, robot, &before.outside(&outside), placed).is_ok_and(|beyond| beyond.cause().is_empty());
+    if found.cause().is_empty() || joints.is_empty() || !(is_small || goes()) {
         return Ok(found);
     }
     let inside = set.clone().without(&rows, "it is outside of the ranges that the robot was identified in");
     let enough = inside.placing_rows(FEWEST_POSES + 1).is_ok();
-    Ok(match enough && recheck(&inside, robot, before, placed).is_ok_and(|of_inside| of_inside.changed) {
+    let shows = |of_inside: Recheck| of_inside.changed || !found.changed && !of_inside.cause().is_empty();
+    Ok(match enough && recheck(&inside, robot, before, placed).is_ok_and(shows) {
         true => found,
         false => Recheck { extrapolated: joints.into_iter().map(|(_, said)| said).collect(), ..found },
     })

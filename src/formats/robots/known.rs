@@ -152,5 +152,6 @@ pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     let (poses, p95_mm) = (expected.map.len(), expected.p95_mm);
     let along = identified.variance_along;
     let freedom = expected.freedom.unwrap_or(3.0 * expected.map.len() as f64);
-    Some(Before { parameters, covariance, correction, trust, along, poses, freedom, p95_mm })
+    let over = identified_over(file, robot).unwrap_or_default();
+    Some(Before { parameters, covariance, correction, trust, along, poses, freedom, p95_mm, over })
 }

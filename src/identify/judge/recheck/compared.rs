@@ -2,20 +2,29 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, SymmetricEigen, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, SymmetricEigen, Vector3, Vector6};
 
 use super::found::Before;
 use super::suspects::Suspect;
 use crate::difference::Difference;
-use crate::geometry::{Transform, fitted_frame, rotation_matrix};
+use crate::geometry::{Transform, fitted_frame, rotation_matrix, rotation_vector};
 use crate::identify::data::dataset::{Dataset, Pose};
 use crate::identify::judge::locate::Trust;
+use crate::identify::judge::placement::Uncertain;
+use crate::identify::residuals::eliminate::Unknowns;
 use crate::identify::residuals::rows::{RowSpec, Rows};
 use crate::identify::sensor::{Extra, Raw, Scatter};
 use crate::identify::settings::Model;
 use crate::identify::solve::linearised::Linearised;
 use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::{Parameter, Robot};
+
+/// How far a placement is from where it stood: turn, rad, and shift, mm.
+pub(super) fn off(frame: &Transform, old: &Uncertain) -> Vector6<f64> {
+    let turn = rotation_vector(&(frame * old.transform.inverse()));
+    let shift = frame.translation.vector - old.transform.translation.vector;
+    Vector6::from_iterator(turn.iter().chain(shift.iter()).copied())
+}
 
 /// What no orientation is known better than, rad: a micrometre at 100 mm.
 const LEAST_TURN_RAD: f64 = 1e-5;
@@ -49,11 +58,36 @@ impl Compared<'_> {
     /// The rows linearised there, and what is to be looked at.
     pub(super) fn at(&self, of_robot: &[f64]) -> Option<(Linearised, Look)> {
         let linear = Linearised::new(self.rows, &self.offsets(of_robot));
-        let (off, columns) = left_over(&linear, self.count);
+        let look = self.look(stacked(&linear, self.count))?;
+        Some((linear, look))
+    }
+
+    /// The same where each placement is held by what is known of where it stood, as readings of it are.
+    pub(super) fn held(&self, of_robot: &[f64], stood: &dyn Fn(usize) -> Option<Uncertain>) -> Option<Look> {
+        let offsets = self.offsets(of_robot);
+        let linear = Linearised::new(self.rows, &offsets);
+        let (mut nuisance, mut all) = stacked(&linear, self.count);
+        let turns = linear.shared - self.count;
+        for (k, unknowns) in self.rows.unknowns(&offsets).iter().enumerate() {
+            let Unknowns::Frame(frame) = unknowns else { continue };
+            let Some(old) = stood(k) else { continue };
+            // A step of the placement adds to how far it is from where it stood.
+            let white = old.covariance.cholesky()?.l().try_inverse()?;
+            let row = all.nrows();
+            nuisance = nuisance.resize_vertically(row + 6, 0.0);
+            all = all.resize_vertically(row + 6, 0.0);
+            nuisance.view_mut((row, turns + 6 * k), (6, 6)).copy_from(&white);
+            all.view_mut((row, 0), (6, 1)).copy_from(&(white * off(frame, &old)));
+        }
+        self.look((nuisance, all))
+    }
+
+    fn look(&self, rows: (DMatrix<f64>, DMatrix<f64>)) -> Option<Look> {
+        let (off, columns) = left_over(rows);
         let known: Vec<usize> = (0..self.before.parameters.len()).collect();
         let of_old = columns.select_columns(&known) * root(&self.before.covariance);
         let difference = Difference::of_white(off, of_old, self.before.freedom)?;
-        Some((linear, Look { difference, columns }))
+        Some(Look { difference, columns })
     }
 
     /// By how much the squared residuals of each row, by its index in the set, shrink those of all where the row is left out: as if its residuals
@@ -188,10 +222,9 @@ fn stacked(linear: &Linearised, count: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     (nuisance, all)
 }
 
-/// White residuals and the columns of the first so many offsets, in coordinates that the placements and the target's turn do not reach.
-fn left_over(linear: &Linearised, count: usize) -> (DVector<f64>, DMatrix<f64>) {
-    let (nuisance, mut all) = stacked(linear, count);
-    let total = all.nrows();
+/// White residuals and the columns of the offsets, in coordinates that the placements and the target's turn do not reach.
+fn left_over((nuisance, mut all): (DMatrix<f64>, DMatrix<f64>)) -> (DVector<f64>, DMatrix<f64>) {
+    let (total, count) = (all.nrows(), all.ncols() - 1);
     let taken = nuisance.ncols();
     nuisance.qr().q_tr_mul(&mut all);
     let rest = all.rows(taken, total.saturating_sub(taken)).into_owned();

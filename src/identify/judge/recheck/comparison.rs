@@ -9,6 +9,7 @@ use crate::difference::Difference;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::placement::Uncertain;
+use crate::identify::residuals::eliminate::Block;
 use crate::robot::{Parameter, Robot};
 
 /// Where the sensor stood by the name of the group.
@@ -75,6 +76,12 @@ impl Comparison<'_> {
         let named = |(_, suspect, off): &(f64, &Suspect, Off)| (suspect.word.clone(), suspect.by(&off.amounts));
         let likeliest = explained.iter().map(named).collect();
         let placements = self.placements(compared, changed, explained.iter().map(|(.., off)| off));
+        let instead = match !changed && placements.iter().any(|p| p.moved) {
+            true => self.instead(compared, &suspects),
+            false => Vec::new(),
+        };
+        let everywhere = Moves::over(self.robot, &self.parameters, &self.before.over);
+        let elsewhere_mm = suspects.iter().map(|s| looks.room_mm(s, &everywhere)).fold(0.0, f64::max);
         let most = |of: fn(&CauseSeen) -> Option<f64>| causes.iter().filter_map(of).fold(0.0, f64::max);
         let (seen_mm, at_most_mm) = (most(|c| c.seen_mm), most(|c| c.at_most_mm));
         // Cameras that are said to stand as before do not take up what the robot is off.
@@ -100,11 +107,28 @@ impl Comparison<'_> {
             effect_mm,
             seen_mm,
             at_most_mm,
+            instead,
+            elsewhere_mm,
+            tolerance_mm: self.before.p95_mm,
             by_cameras,
             correction_mm,
             extrapolated,
         };
         Some(Said { recheck, difference: looks.look.difference, likelihood })
+    }
+
+    /// What may have changed of the robot where no placement moved, and explains what looks like placements that did.
+    fn instead(&self, compared: &Compared, suspects: &[Suspect]) -> Vec<(String, String)> {
+        let stood = |block: usize| {
+            let Block::Points(points) = &compared.rows.blocks[block] else { return None };
+            let row = compared.rows.rows[points.spots.first()?.pose];
+            (self.stood)(&self.set.groups[self.set.poses[row].group].name)
+        };
+        let held = |offsets: &[f64]| compared.held(offsets, &stood);
+        let Some(look) = held(&vec![0.0; compared.count]) else { return Vec::new() };
+        let explained = Looks { look, again: &held, suspects }.explained();
+        let others = explained.into_iter().filter(|(_, suspect, _)| suspect.word != "joint-1");
+        others.map(|(_, suspect, off)| (suspect.word.clone(), suspect.by(&off.amounts))).collect()
     }
 
     /// Each placement against where it stood: moved where it did whichever of the causes it was. Of a change that nothing explains they tell nothing.

@@ -29,6 +29,8 @@ pub struct Before {
     pub freedom: f64,
     /// What 95 % of its position errors were stated to be below, mm.
     pub p95_mm: f64,
+    /// The ranges of its joints there, rad (mm where one slides); empty where nothing says so.
+    pub over: Vec<(f64, f64)>,
 }
 
 /// What the poses say of one cause.
@@ -85,6 +87,13 @@ pub struct Recheck {
     pub seen_mm: f64,
     /// The largest movement of the target by a single cause that the poses leave room for, mm.
     pub at_most_mm: f64,
+    /// What of the robot explains placements that seem to have moved, had none: words for files and for people. A robot that stands nearly still shows
+    /// a turned joint as a sensor that moved.
+    pub instead: Vec<(String, String)>,
+    /// The largest movement of the target by a single cause over all that the robot was identified in which the poses leave room for, mm.
+    pub elsewhere_mm: f64,
+    /// What matters, mm: the robot's own errors, where nothing else is said.
+    pub tolerance_mm: f64,
     /// Whether the points are those of cameras, or another instrument's.
     pub by_cameras: bool,
     /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what was identified, as much may be off.
@@ -94,6 +103,26 @@ pub struct Recheck {
 }
 
 impl Before {
+    /// The same where these joints stand outside of what was identified. Links hold everywhere; a term that follows an angle was seen over a range, and
+    /// says of places beyond it no more than that there is something of its size.
+    #[must_use]
+    pub fn outside(&self, joints: &[usize]) -> Before {
+        let mut beyond = self.clone();
+        for (at, (parameter, by)) in self.parameters.iter().zip(&self.correction).enumerate() {
+            let follows = match parameter {
+                Parameter::Harmonic(joint, _) | Parameter::Wobble(joint, _) | Parameter::Coupling(_, joint) => {
+                    joints.contains(joint)
+                }
+                Parameter::Gravity(..) | Parameter::Bending(..) => !joints.is_empty(),
+                _ => false,
+            };
+            if follows {
+                beyond.covariance[(at, at)] += (by / parameter.file_unit().1).powi(2);
+            }
+        }
+        beyond
+    }
+
     /// Columns and amounts of what was corrected of the robot without its tool.
     pub(super) fn corrected(&self) -> (Vec<(usize, f64)>, Vec<f64>) {
         let links = self.parameters.iter().zip(&self.correction).enumerate();
@@ -108,7 +137,10 @@ impl Recheck {
         match (self.changed, self.likeliest.is_empty()) {
             (true, true) => "unknown".to_owned(),
             (true, false) => self.likeliest.iter().map(|(word, _)| word.as_str()).collect::<Vec<_>>().join("|"),
-            (false, _) if self.placements.iter().any(|p| p.moved) => "camera-moved|joint-1".to_owned(),
+            (false, _) if self.placements.iter().any(|p| p.moved) => {
+                let instead = self.instead.iter().map(|(word, _)| word.as_str());
+                ["camera-moved", "joint-1"].into_iter().chain(instead).collect::<Vec<_>>().join("|")
+            }
             (false, _) => String::new(),
         }
     }
@@ -138,7 +170,11 @@ impl Recheck {
             .map(|p| format!("group {} by {:.4} mm and {:.4} deg", p.group, p.shift_mm, p.turn_rad.to_degrees()))
             .collect();
         if !self.extrapolated.is_empty() {
-            let found = self.likeliest.first().map_or_else(String::new, |(_, words)| format!(", as by {words},"));
+            let moved = moved
+                .first()
+                .map(|group| format!("{} elsewhere ({group})", self.stands().replace(" stand", " that stand")));
+            let found = self.likeliest.first().map(|(_, words)| words.clone()).or(moved);
+            let found = found.map_or_else(String::new, |found| format!(", as by {found},"));
             return format!(
                 "these poses stand where the robot was not identified ({}): what is off there{found} is no more than what was corrected \
                  of the robot, and may be what its model lacks as well as a change",
@@ -155,11 +191,35 @@ impl Recheck {
                     false => format!("{causes}; and {whose} moved, or the zero of joint 1: {}", moved.join(", ")),
                 }
             }
-            (false, _) if !moved.is_empty() => {
-                let stands = if self.by_cameras { "the cameras stand" } else { "the instrument stands" };
-                format!("the robot is the same; {stands} elsewhere, or the zero of joint 1 moved: {}", moved.join(", "))
-            }
+            (false, _) if !moved.is_empty() => self.of_moved(&moved.join(", ")),
             (false, _) => "no change beyond chance".to_owned(),
+        }
+    }
+
+    /// Who measured and stands.
+    fn stands(&self) -> &'static str {
+        if self.by_cameras { "the cameras stand" } else { "the instrument stands" }
+    }
+
+    /// Whether the poses rule out that the robot changed: in place of the sensor that moved, and beside it by as much as matters.
+    pub fn is_same(&self) -> bool {
+        !self.changed && self.instead.is_empty() && self.at_most_mm.max(self.elsewhere_mm) <= self.tolerance_mm
+    }
+
+    /// Of placements that moved, or seem to.
+    fn of_moved(&self, moved: &str) -> String {
+        let (stands, instead) = (self.stands(), self.instead.iter().map(|(_, words)| words.as_str()));
+        match (self.is_same(), self.instead.is_empty()) {
+            (true, _) => format!("the robot is the same; {stands} elsewhere, or the zero of joint 1 moved: {moved}"),
+            (_, true) => format!(
+                "{stands} elsewhere, or the zero of joint 1 moved: {moved}; whether the robot changed as well these poses leave open, by up to {:.4} mm \
+                 where it was identified",
+                self.at_most_mm.max(self.elsewhere_mm)
+            ),
+            (_, false) => format!(
+                "{stands} elsewhere, or the zero of joint 1 moved ({moved}), or the robot changed: {}; these poses do not tell which",
+                instead.collect::<Vec<_>>().join(", or ")
+            ),
         }
     }
 }

@@ -2,15 +2,21 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::compared::Compared;
+use super::compared::{self, Compared};
 use super::found::{Before, FALSE_ALARM, Moved};
 use crate::difference::{Difference, SEEN};
-use crate::geometry::{rigid_columns, rotation_vector};
+use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::placement::Uncertain;
+use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::residuals::eliminate::{Block, Linear, Unknowns};
 use crate::identify::solve::linearised::{Linearised, Placement};
+use crate::identify::solve::swarm::halton;
 use crate::linear_algebra::{product, pseudo_inverse, without};
+use crate::robot::{Parameter, Robot};
+
+/// Poses that stand for the ranges of the joints.
+const POSES: usize = 64;
 
 /// How far offsets move the target at each pose of each placement, mm.
 pub(super) struct Moves {
@@ -22,24 +28,24 @@ pub(super) struct Moves {
 
 impl Moves {
     pub(super) fn new(linear: &Linearised, count: usize) -> Moves {
-        let robot = count - 1;
         let of_placement = |placement: &Placement| {
             let mut of_group: Vec<usize> = placement.poses.iter().flatten().copied().collect();
             of_group.dedup();
-            let mut columns = DMatrix::zeros(3 * of_group.len(), count);
-            let mut rigid = DMatrix::zeros(3 * of_group.len(), 6);
-            for (k, &pose) in of_group.iter().enumerate() {
-                let place = &linear.places[pose];
-                columns.view_mut((3 * k, 0), (3, robot)).copy_from(&place.point_columns);
-                columns.view_mut((3 * k, robot), (3, 1)).copy_from(&(1e-3 * place.point_mm.coords));
-                rigid.view_mut((3 * k, 0), (3, 6)).copy_from(&rigid_columns(&place.point_mm.coords));
-            }
-            let anew = without(&columns, &rigid);
-            columns.set_column(robot, &anew.column(robot));
-            (anew, columns)
+            of_places(&of_group.iter().map(|&pose| &linear.places[pose]).collect::<Vec<_>>(), count - 1)
         };
         let (anew, in_base) = linear.placements.iter().map(of_placement).unzip();
         Moves { anew, in_base }
+    }
+
+    /// Over the ranges of the joints; nothing moves where none are known.
+    pub(super) fn over(robot: &Robot, parameters: &[Parameter], ranges: &[(f64, f64)]) -> Moves {
+        let unit = halton::points(POSES, ranges.len(), 0);
+        let within = |pose: &[f64]| pose.iter().zip(ranges).map(|(u, (low, high))| low + u * (high - low)).collect();
+        let joints: Vec<Vec<f64>> = unit.chunks(ranges.len().max(1)).map(within).collect();
+        let joints: Vec<&[f64]> = joints.iter().map(Vec::as_slice).collect();
+        let places = Kinematics::new(robot, robot, parameters, &joints).places(&vec![0.0; parameters.len()], true);
+        let (anew, in_base) = of_places(&places.iter().collect::<Vec<_>>(), parameters.len());
+        Moves { anew: vec![anew], in_base: vec![in_base] }
     }
 
     /// The largest of all poses after the placements were found anew, mm.
@@ -51,6 +57,20 @@ impl Moves {
     pub(super) fn in_base_mm(&self, columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
         most_mm(&self.in_base, columns, amounts)
     }
+}
+
+/// How far the offsets of a robot, and behind them a thousandth of scale, move the target at these places, mm: once placed anew, and in the base.
+fn of_places(places: &[&Place], robot: usize) -> (DMatrix<f64>, DMatrix<f64>) {
+    let mut columns = DMatrix::zeros(3 * places.len(), robot + 1);
+    let mut rigid = DMatrix::zeros(3 * places.len(), 6);
+    for (k, place) in places.iter().enumerate() {
+        columns.view_mut((3 * k, 0), (3, robot)).copy_from(&place.point_columns);
+        columns.view_mut((3 * k, robot), (3, 1)).copy_from(&(1e-3 * place.point_mm.coords));
+        rigid.view_mut((3 * k, 0), (3, 6)).copy_from(&rigid_columns(&place.point_mm.coords));
+    }
+    let anew = without(&columns, &rigid);
+    columns.set_column(robot, &anew.column(robot));
+    (anew, columns)
 }
 
 fn most_mm(moves: &[DMatrix<f64>], columns: &[(usize, f64)], amounts: &[f64]) -> f64 {
@@ -103,9 +123,8 @@ pub(super) fn placements(
         let Some(old) = stood(name) else { continue };
         let covariance =
             of_frame(placement, count, before, off) + DMatrix::from_iterator(6, 6, old.covariance.iter().copied());
-        let turn = rotation_vector(&(frame * old.transform.inverse()));
-        let shift = frame.translation.vector - old.transform.translation.vector;
-        let off = DVector::from_iterator(6, turn.iter().chain(shift.iter()).copied());
+        let off = DVector::from_column_slice(compared::off(&frame, &old).as_slice());
+        let turn_rad = off.rows(0, 3).norm();
         let Some(difference) = Difference::new(off, &covariance, before.poses, 1.0) else { continue };
         // What the move does to the points in the middle of them.
         let middle = points.spots.iter().map(|s| s.point_mm.coords).sum::<Vector3<f64>>() / points.spots.len() as f64;
@@ -116,7 +135,7 @@ pub(super) fn placements(
             group: name.clone(),
             shift_mm: (at_middle * &difference.off).norm(),
             seen_mm: (level + SEEN) * spread.diagonal().max().sqrt(),
-            turn_rad: turn.norm(),
+            turn_rad,
             moved: difference.chi_square() > difference.limit(6, FALSE_ALARM),
         });
     }

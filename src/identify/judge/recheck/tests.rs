@@ -11,6 +11,8 @@ use crate::identify::settings::{Extensions, Settings};
 use crate::identify::synthetic;
 use crate::measurements::Measurement;
 
+mod near;
+
 const NOISE_MM: f64 = 0.03;
 const NOISE_RAD: f64 = 2e-4;
 
@@ -37,15 +39,17 @@ fn cell(oriented: bool, seed: u64) -> Cell {
     let identified = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
     let formulation = identified.formulation().unwrap();
     let scatter = formulation.rows.scatter;
+    let expected = Expected::new(formulation, &set, &identified.fitted);
     let before = Before {
         correction: Vec::new(),
+        over: expected.joint_ranges.iter().map(|range| (range[0].to_radians(), range[1].to_radians())).collect(),
         parameters: formulation.parameters().to_vec(),
         covariance: formulation.whole_covariance(),
         trust: Trust { point_mm: scatter.point_mm, rotation_rad: oriented.then_some(scatter.rotation_rad) },
         along: variances_along(formulation).into_iter().collect(),
         poses: set.poses.len(),
         freedom: scatter.freedom,
-        p95_mm: Expected::new(formulation, &set, &identified.fitted).p95_mm,
+        p95_mm: expected.p95_mm,
     };
     Cell { truth: world.truth, found: identified.robot().clone(), before }
 }
