@@ -107,8 +107,11 @@ impl Problem {
 
     /// How corners scatter at these values.
     fn likeliest(&self, unknowns: usize) -> Result<(Noise, Loss), Error> {
-        let alike = self.neighbours().corners_alike();
-        Ok(Noise::likeliest(&self.left()?, unknowns, alike))
+        let left = self.left()?;
+        // A pair says something of its own, whatever moved.
+        let of_pair = left.len() as f64 / self.views.len().max(1) as f64;
+        let alike = self.neighbours().corners_alike().min(of_pair.max(1.0));
+        Ok(Noise::likeliest(&left, unknowns, alike))
     }
 
     /// How the residuals of neighbouring corners hang together.
