@@ -173,12 +173,9 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     };
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = views.iter().map(|view| view.pair.clone()).collect();
-    let place = hypothesis::any_place(&compared);
-    let effect_mm_of = |change: Vector6<f64>| moves(&place.iter().zip(&change).map(|(by, amount)| by * *amount).sum());
-    let strays = strays(before, &solved, &problem.values, &layout, &corners.board)
-        .into_iter()
-        .map(|(i, change)| Stray { pair: views[i].pair.clone(), effect_mm: effect_mm_of(change) })
-        .collect();
+    let place = hypothesis::any_place(&layout);
+    let of_place = |change: Vector6<f64>| moves(&place.iter().zip(&change).map(|(by, amount)| by * *amount).sum());
+    let strays = strays(before, (&solved, &problem.values), &layout, &corners.board, of_place);
     Ok(Recheck { pairs, skipped, strays, length_mm, causes, change, effect_mm, seen_mm })
 }
 
@@ -186,11 +183,11 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
 /// these more.
 fn strays(
     before: &Before,
-    solved: &Solved,
-    old: &Values,
+    (solved, old): (&Solved, &Values),
     layout: &Layout,
     board: &Board,
-) -> Vec<(usize, Vector6<f64>)> {
+    effect_mm: impl Fn(Vector6<f64>) -> f64,
+) -> Vec<Stray> {
     let mut problem = solved.problem.clone();
     problem.values = old.clone();
     problem.values.shared.shape_mm = solved.shared().shape_mm;
@@ -203,7 +200,8 @@ fn strays(
     }
     let Some(rig) = before.covariance(layout) else { return Vec::new() };
     let usual = (before.pair_excess, before.farthest_pair);
-    pair_excess::strays(&problem, board, layout, &rig, usual)
+    let strays = pair_excess::strays(&problem, board, layout, &rig, usual).into_iter();
+    strays.map(|(i, change)| Stray { pair: problem.views[i].pair.clone(), effect_mm: effect_mm(change) }).collect()
 }
 
 /// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the other side.
