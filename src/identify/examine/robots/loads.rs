@@ -8,7 +8,7 @@
 
 use nalgebra::Vector3;
 
-use super::fit::{Left, Points};
+use super::fit::{Left, Points, TARGET};
 use super::{BEATS, CHANCE, MUCH_LARGER, SHORTEST, Table, by_chance};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
@@ -23,9 +23,12 @@ const ROUNDS: usize = 20;
 impl Points {
     /// The same with the weight of a load at the target on each joint that turns, in these rows.
     pub(super) fn with_load(&self, loaded: Vec<bool>) -> Points {
+        let mut parameters = self.parameters.clone();
         let turning = (0..self.robot.joints.len()).filter(|&joint| !self.robot.joints[joint].slides);
-        let of_load = turning.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool));
-        Points { loaded, ..self.with_terms(of_load) }
+        let before_target = parameters.len() - TARGET;
+        parameters
+            .splice(before_target..before_target, turning.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool)));
+        Points { parameters, loaded, ..self.clone() }
     }
 }
 
