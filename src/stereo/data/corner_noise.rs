@@ -74,10 +74,9 @@ impl Noise {
     }
 
     /// The likeliest noise with the loss that belongs to it, `unknowns` numbers being fitted to the same residuals: Gaussian, or Student's
-    /// distribution where its tails are more than chance (Bayes' criterion for one number more, of as many corners as are left where so many say
-    /// `alike`: boards that moved between the two pictures of a few pairs have corners that go together, and no tails). Pictures that nobody
-    /// triggered have heavy tails, and some of their corners are simply wrong.
-    pub fn likeliest(residuals: &[(Observation, Vector2<f64>)], unknowns: usize, alike: f64) -> (Noise, Loss) {
+    /// distribution where its tails are more than chance (Bayes' criterion for one number more). Pictures that nobody triggered have
+    /// heavy tails, and some of their corners are simply wrong.
+    pub fn likeliest(residuals: &[(Observation, Vector2<f64>)], unknowns: usize) -> (Noise, Loss) {
         /// Degrees of freedom that are tried; with fewer the tails of a pair that moved would be taken for the corners'.
         const FREEDOMS: [f64; 9] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 24.0, 36.0, 64.0];
         let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
@@ -86,9 +85,7 @@ impl Noise {
             (noise, loss, noise.log_likelihood(residuals, loss))
         };
         let gaussian = with(Loss::Squared);
-        // At least as much as one more number costs by Akaike's criterion.
-        let cost = (0.5 * (residuals.len() as f64 / alike).max(1.0).ln()).max(1.0);
-        let least = gaussian.2 + alike * cost;
+        let least = gaussian.2 + 0.5 * (residuals.len().max(1) as f64).ln();
         let likeliest = FREEDOMS.map(|freedom| with(Loss::Student(freedom))).into_iter();
         let likeliest = likeliest.filter(|student| student.2 > least).max_by(|a, b| a.2.total_cmp(&b.2));
         let (noise, loss, _) = likeliest.unwrap_or(gaussian);
@@ -204,11 +201,7 @@ pub fn whitener(covariance: &Matrix2<f64>) -> Matrix2<f64> {
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Point2;
-
     use super::*;
-    use crate::imaging::Side;
-    use crate::simulate::draws::{Draws, Purpose};
 
     #[test]
     fn what_was_added_gives_way_to_the_print_first() {
@@ -222,20 +215,5 @@ mod tests {
         let unknown = noise.of_share(0.25, 0.0);
         assert!((unknown.added_px - 0.015).abs() < 1e-12);
         assert!((noise.of_share(0.05, 0.1).factor - 0.5).abs() < 1e-12);
-    }
-
-    /// Residuals of two sizes have heavy tails where each corner is by itself; where most say the same, they are one picture's that moved.
-    #[test]
-    fn corners_that_say_the_same_make_no_tails() {
-        let mut draws = Draws::new(4, Purpose::Points, 0);
-        let corner = Observation::of_point(Side::Left, Point2::origin(), 0.01);
-        let mut of_size = |i: usize| {
-            let px = if i % 3 == 0 { 0.5 } else { 0.1 };
-            (corner, Vector2::new(draws.normal(), draws.normal()) * px)
-        };
-        let residuals: Vec<(Observation, Vector2<f64>)> = (0..200).map(&mut of_size).collect();
-        let loss = |alike: f64| Noise::likeliest(&residuals, 6, alike).1;
-        assert!(matches!(loss(1.0), Loss::Student(_)));
-        assert_eq!(loss(100.0), Loss::Squared);
     }
 }

@@ -58,15 +58,6 @@ impl NeighbourCorrelation {
         let sure = self.across > SURE * self.standard_error;
         if sure { 1.0 + self.across.min(WHOLE_OVERLAP) * self.links_per_corner } else { 1.0 }
     }
-
-    /// How many corners say the same, where the correlation falls with each further row and column as it does to the next: the integral of such a
-    /// correlation, (1 + r) / (1 - r) in each direction. One where none shows.
-    pub fn corners_alike(&self) -> f64 {
-        /// Of a picture whose corners all go together; what is left then is one number a picture.
-        const MOST: f64 = 0.95;
-        let r = (0.5 * (self.along + self.across)).min(MOST);
-        if r > SURE * self.standard_error { ((1.0 + r) / (1.0 - r)).powi(2) } else { 1.0 }
-    }
 }
 
 #[derive(Default)]

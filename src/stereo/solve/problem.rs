@@ -105,15 +105,6 @@ impl Problem {
         residuals::active(&self.views, &self.values).ok_or_else(unseen)
     }
 
-    /// How corners scatter at these values.
-    fn likeliest(&self, unknowns: usize) -> Result<(Noise, Loss), Error> {
-        let left = self.left()?;
-        // A pair says something of its own, whatever moved.
-        let of_pair = left.len() as f64 / self.views.len().max(1) as f64;
-        let alike = self.neighbours().corners_alike().min(of_pair.max(1.0));
-        Ok(Noise::likeliest(&left, unknowns, alike))
-    }
-
     /// How the residuals of neighbouring corners hang together.
     pub fn neighbours(&self) -> NeighbourCorrelation {
         let of_view = |(view, pose)| residuals::of_view(&self.values.shared, view, pose);
@@ -124,7 +115,7 @@ impl Problem {
     pub fn solve_near(&self, layout: &Layout) -> Result<Solved, Error> {
         let mut problem = self.with_layout(layout);
         let unknowns = layout.count() + 6 * problem.views.len();
-        let (mut noise, mut loss) = problem.likeliest(unknowns)?;
+        let (mut noise, mut loss) = Noise::likeliest(&problem.left()?, unknowns);
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut problem.views);
             // With a robust loss the last word is that of the weighted squares below.
@@ -133,7 +124,7 @@ impl Problem {
                 _ => problem.search(layout, loss, Search::ROBUST).values,
             };
             let before = (noise, loss);
-            (noise, loss) = problem.likeliest(unknowns)?;
+            (noise, loss) = Noise::likeliest(&problem.left()?, unknowns);
             let moved = |a: f64, b: f64| (a - b).abs() > 1e-4 * b;
             if loss == before.1 && !moved(before.0.added_px, noise.added_px) && !moved(before.0.factor, noise.factor) {
                 break;
