@@ -147,9 +147,9 @@ fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located,
     let placed = Placed::new(task.set, &rows, &of_all, &vec![0.0; of_all.len()], &shared, student);
     let mut placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
     placed.target_found = !task.parameters.is_empty();
-    let of_points = misfit(task, trust, &offsets);
+    let of_points = misfit(task, trust.point_mm, &offsets);
     let Misfit { chi_square, freedom, rms_mm } = of_points;
-    let agreement = agreement(task, trust, of_points);
+    let agreement = agreement(task, trust.point_mm, of_points);
     let fit = Fit {
         poses: task.set.poses.len(),
         rms_mm,

@@ -1,14 +1,13 @@
 //! Whether points contradict the robot that they are placed with.
 //!
-//! In: the task of a placement, what is known of the robot, the offsets that were found. Out: how far the points miss the robot, and what that means.
-//! Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not, how well the instrument
+//! In: the task of a placement, how far a coordinate of the robot is known to scatter (mm), the offsets that were found. Out: how
+//! far the points miss the robot, and what that means. Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not, how well the instrument
 //! measures is what no change of the robot's geometry explains, and only what exceeds that and the robot's known scatter is its fault (an F test:
 //! the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains nothing beyond
 //! chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-use super::Trust;
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Raw, Scatter};
 use crate::identify::settings::Model;
@@ -41,15 +40,15 @@ pub enum Agreement {
 }
 
 /// With the target's place and the frames fitted to the points alone.
-pub fn misfit(task: &Task, trust: Trust, offsets: &[f64]) -> Misfit {
+pub fn misfit(task: &Task, robot_mm: f64, offsets: &[f64]) -> Misfit {
     // Orientations weigh nothing.
-    let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(trust.point_mm) };
+    let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(robot_mm) };
     let rows = task.rows_at(scatter, task.robot);
     fitted(&rows, offsets.to_vec(), |_, _| task.parameters.len())
 }
 
 /// What a misfit says of the robot.
-pub fn agreement(task: &Task, trust: Trust, found: Misfit) -> Agreement {
+pub fn agreement(task: &Task, robot_mm: f64, found: Misfit) -> Agreement {
     let freedom = found.freedom as f64;
     let more_than_known = ChiSquared::new(freedom).is_ok_and(|law| law.cdf(found.chi_square) > 1.0 - FALSE_ALARM);
     if !more_than_known {
@@ -60,7 +59,7 @@ pub fn agreement(task: &Task, trust: Trust, found: Misfit) -> Agreement {
     }
     let geometry = task.robot.mdh_parameters();
     let task = Task { parameters: &geometry, extras: &[], model: Model::Position, ..*task };
-    let rows = task.rows_at(Scatter::of_point(trust.point_mm), task.robot);
+    let rows = task.rows_at(Scatter::of_point(robot_mm), task.robot);
     let explained = fitted(&rows, vec![0.0; geometry.len()], rank);
     let (left, of_geometry) = (explained.freedom as f64, freedom - explained.freedom as f64);
     let gain = (found.chi_square - explained.chi_square) / of_geometry / (explained.chi_square / left);
