@@ -1,10 +1,10 @@
 //! Whether points contradict the robot that they are placed with.
 //!
-//! In: the task of a placement, how far a coordinate of the robot is known to scatter (mm), the offsets that were found. Out: how
-//! far the points miss the robot, and what that means. Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not, how well the instrument
-//! measures is what no change of the robot's geometry explains, and only what exceeds that and the robot's known scatter is its fault (an F test:
-//! the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains nothing beyond
-//! chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt.
+//! In: the task of a placement, how far a coordinate of the robot is known to scatter (mm), the offsets that were found. Out: how far the points
+//! miss the robot, and what that means. Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not,
+//! how well the instrument measures is what no change of the robot's geometry explains, and only what exceeds that and the robot's known scatter is
+//! its fault (an F test: the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains nothing
+//! beyond chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
