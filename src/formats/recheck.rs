@@ -49,10 +49,9 @@ impl Standing {
         }
     }
 
-    /// The same where pairs contradict the calibration by themselves, and by what matters.
+    /// The same where pairs contradict the calibration by themselves.
     #[must_use]
-    pub fn beside(self, strays: &[Stray], tolerance_mm: f64) -> Standing {
-        let contradicted = strays.iter().any(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm);
+    pub fn beside(self, contradicted: bool) -> Standing {
         if contradicted && self == Standing::StillValid { Standing::Undecided } else { self }
     }
 
@@ -82,7 +81,7 @@ pub struct RecheckFile {
     against: String,
     pairs: Vec<String>,
     pairs_skipped: Vec<Skipped>,
-    /// Pairs that contradict the calibration by themselves.
+    /// Pairs that contradict the calibration by themselves, and by what matters.
     pairs_contradicting: Vec<Stray>,
     /// The length that changes are given for.
     length_mm: f64,

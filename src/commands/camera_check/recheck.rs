@@ -17,6 +17,7 @@ use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{PairFiles, Pairing};
 use crate::imaging::{Corners, Wanted, find_corners};
+use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::pairs::open_numbers;
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
 use crate::{progress, ranges, report};
@@ -56,11 +57,13 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     warnings.iter().for_each(progress::warn);
     let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
-    let found = recheck::recheck(&before, &corners)?;
+    let mut found = recheck::recheck(&before, &corners)?;
+    // As of a change, what moves a length by less is nothing to act on.
+    found.strays.retain(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm);
 
-    let standing =
-        Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm).by(whole.is_some());
-    let standing = standing.beside(&found.strays, tolerance_mm);
+    let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm)
+        .by(whole.is_some())
+        .beside(!found.strays.is_empty());
     let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check::new(&content, date));

@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Series, Shape, Shared, TargetPose};
+use crate::stereo::board_pose::pair_excess::stray_limit;
 use crate::stereo::board_pose::rig_change::cause::{named, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Change};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
@@ -99,7 +100,7 @@ impl Finisher<'_> {
         let outside = || consistency::of_outsider(&alone.part, &self.found.covariance);
         let change = change.copied().or_else(outside);
         let own = alone.chi_square.clamp(1.0, OUTSIDER_LIMIT);
-        if let Some(change) = change.filter(|c| c.fall > self.run.known.pose_limit() * own) {
+        if let Some(change) = change.filter(|c| c.fall > stray_limit(self.run.known.farthest_pair) * own) {
             return Err(self.two_moments(i, alone, &change));
         }
         if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.found.excess {

@@ -8,7 +8,6 @@ use crate::measurements::RobotPose;
 use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Series};
-use crate::stereo::board_pose::pair_excess::stray_limit;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::flip::Flip;
@@ -67,11 +66,6 @@ pub struct Knowledge {
 }
 
 impl Knowledge {
-    /// A change at one pose that lowers chi-square by more than this ends its measurement.
-    pub(super) fn pose_limit(&self) -> f64 {
-        stray_limit(self.farthest_pair)
-    }
-
     pub(super) fn usual(&self) -> Usual {
         Usual { noise: self.noise, excess: self.pair_excess.unwrap_or(1.0) }
     }
