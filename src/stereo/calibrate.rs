@@ -19,8 +19,8 @@ use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
-use crate::stereo::solve::{Priors, Problem, Uncertainty};
-use crate::stereo::{Error, Rig};
+use crate::stereo::solve::{Priors, Problem, Solved, Uncertainty};
+use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -155,18 +155,17 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    let Choice { layout, near, priors, scatter, scores: lens_scores } =
-        lens_ladder::choose(&start, Some(missed).filter(|_| !by_pairs), &corners.board, options)
-            .map_err(|e| e.without(&skipped))?;
+    let missed_at_all = Some(missed).filter(|_| !by_pairs);
+    let choose = |below| lens_ladder::choose(&start, missed_at_all, &corners.board, options, below);
+    let (choice, solved, by_corners) =
+        solved_by(&start, choose).map_err(|e| e.without(&skipped).of_lens(options.lens))?;
+    let Choice { layout, scatter, scores: lens_scores, .. } = choice;
     let known = options.known.as_ref();
     let each_alone = known.is_none() && scatter.is_some();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
-    let solved = Problem { values: near.unwrap_or(start.values), priors, views: start.views }
-        .solve(&layout)
-        .map_err(|e| e.without(&skipped).of_lens(options.lens))?;
     let neighbours = solved.problem.neighbours();
     let inflation = solved.inflation();
-    let by_noise = solved.uncertainty(&layout).map_err(|e| e.of_lens(options.lens))?.scaled(inflation);
+    let by_noise = by_corners.scaled(inflation);
     let without_scatter = by_noise.shared.clone();
     let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
@@ -204,4 +203,24 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
         values,
         uncertainty,
     })
+}
+
+/// The pairs with what is chosen for them. A lens that predicts held-out pairs best may still have numbers that can be exchanged for each other,
+/// where something that no lens explains made it look better; a simpler one is taken then.
+fn solved_by(
+    start: &Problem,
+    choose: impl Fn(Option<Lens>) -> Result<Choice, Error>,
+) -> Result<(Choice, Solved, Uncertainty), Error> {
+    let mut below = None;
+    loop {
+        let choice = choose(below)?;
+        let Choice { layout, near, priors, .. } = &choice;
+        let values = near.clone().unwrap_or_else(|| start.values.clone());
+        let solved = Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout);
+        match solved.and_then(|solved| Ok((solved.uncertainty(layout)?, solved))) {
+            Ok((uncertainty, solved)) => return Ok((choice, solved, uncertainty)),
+            Err(error) if choice.simpler().is_none() => return Err(error),
+            Err(_) => below = layout.left,
+        }
+    }
 }

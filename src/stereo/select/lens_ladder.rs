@@ -22,12 +22,18 @@ use crate::stereo::{Error, Lens};
 
 /// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose pictures were not taken at one
 /// moment, the lenses are expected to be those; which model, the pairs say, where they say anything. `missed` is how far pictures are missed,
-/// where that may decide.
-pub fn choose(start: &Problem, missed: Option<Missed>, board: &Board, options: &Options) -> Result<Choice, Error> {
+/// where that may decide; `below` is a lens that turned out to be richer than the pairs determine.
+pub fn choose(
+    start: &Problem,
+    missed: Option<Missed>,
+    board: &Board,
+    options: &Options,
+    below: Option<Lens>,
+) -> Result<Choice, Error> {
     if let Some(known) = &options.known {
         return known_lenses::choose(start, known, options);
     }
-    let of_pairs = of_pairs(start, board, options);
+    let of_pairs = of_pairs(start, board, options).map(|choice| choice.below(below));
     let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
     let of = |Choice { layout, near, priors, .. }: &Choice| {
         let values = near.clone().unwrap_or_else(|| start.values.clone());

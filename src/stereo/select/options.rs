@@ -2,7 +2,7 @@
 
 use crate::stereo::Lens;
 use crate::stereo::model::{KnownLenses, Layout, Values};
-use crate::stereo::select::model_comparison::LensScore;
+use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::solve::Priors;
 
 /// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
@@ -42,4 +42,21 @@ pub struct Choice {
     pub scatter: Option<KnownScatter>,
     /// Every lens of the ladder; empty where the lens was forced.
     pub scores: Vec<LensScore>,
+}
+
+impl Choice {
+    /// The same where its lens is simpler than this one, or else the richest that is.
+    pub fn below(self, lens: Option<Lens>) -> Choice {
+        let is_below = lens.is_none() || self.layout.left < lens;
+        if is_below { self } else { self.simpler().map_or(self, |simpler| simpler.below(lens)) }
+    }
+
+    /// The richest lens simpler than the chosen one that the pairs determined when it was tried.
+    pub fn simpler(&self) -> Option<Choice> {
+        let tried = self.scores.iter().filter_map(|score| score.trial.as_ref());
+        let simpler =
+            tried.filter(|trial| trial.layout.left < self.layout.left).max_by_key(|trial| trial.layout.left)?;
+        let Trial { layout, values, priors, .. } = simpler.clone();
+        Some(Choice { layout, near: Some(values), priors, ..self.clone() })
+    }
 }

@@ -107,6 +107,18 @@ impl Points {
         self.fitted(parts, self.at_file(parts), STEPS, weights.to_vec(), &mut |_, _| ()).0
     }
 
+    /// Where one robot for all parts ends.
+    pub(super) fn solved(&self, parts: &[Vec<usize>], weights: &[f64]) -> DVector<f64> {
+        self.fitted(parts, self.at_file(parts), STEPS, weights.to_vec(), &mut |_, _| ()).1
+    }
+
+    /// One robot for all parts, from where one without the last parameters before the target's place ended.
+    pub(super) fn together_from(&self, parts: &[Vec<usize>], weights: &[f64], near: &DVector<f64>) -> Left {
+        let more = self.at_file(parts).len() - near.len();
+        let start = near.clone().insert_rows(self.parameters.len() - TARGET - more, more, 0.0);
+        self.fitted(parts, start, STEPS, weights.to_vec(), &mut |_, _| ()).0
+    }
+
     /// One robot for these rows with common placements, and where the further tools stand from the first, mm.
     pub(super) fn with_tools(&self, rows: Vec<usize>, weights: &[f64]) -> (Left, Vec<Vector3<f64>>) {
         let parts = [rows];

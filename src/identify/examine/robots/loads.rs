@@ -3,12 +3,12 @@
 //! In: the fitted rows, and the robot of the file. Out: which rows are under the load, where they come in any order. Method: each joint turns by
 //! a compliance of its own times the torque that a weight at the target has about it. The rows whose errors have most of that are under the load at
 //! first, and then those that it brings nearer, until no row changes. One robot with the load in these rows is held against one with the load in
-//! all of them and in none, by Fisher's test and by what is left, as of robots. Goes wrong: loads that move the target by less than about three
+//! all of them and in none, by Fisher's test and by what is left, as of robots, and against one with any term beyond its links. Goes wrong: loads that move the target by less than about three
 //! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder.
 
 use nalgebra::Vector3;
 
-use super::fit::{Left, Points, TARGET};
+use super::fit::{Left, Points};
 use super::{BEATS, CHANCE, MUCH_LARGER, SHORTEST, Table, by_chance};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
@@ -23,12 +23,9 @@ const ROUNDS: usize = 20;
 impl Points {
     /// The same with the weight of a load at the target on each joint that turns, in these rows.
     pub(super) fn with_load(&self, loaded: Vec<bool>) -> Points {
-        let mut parameters = self.parameters.clone();
         let turning = (0..self.robot.joints.len()).filter(|&joint| !self.robot.joints[joint].slides);
-        let before_target = parameters.len() - TARGET;
-        parameters
-            .splice(before_target..before_target, turning.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool)));
-        Points { parameters, loaded, ..self.clone() }
+        let of_load = turning.map(|joint| Parameter::Gravity(joint, LoadPoint::Tool));
+        Points { loaded, ..self.with_terms(of_load) }
     }
 }
 
@@ -57,7 +54,8 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
     let is_told = other.len() >= SHORTEST
         && least.scatter_mm() > (MUCH_LARGER * apart_mm).max(REPEATABILITY_MM)
         && apart_mm < IMPLAUSIBLE_MM
-        && by_chance(&left, &least)? * (rows.len() as f64) < CHANCE;
+        && by_chance(&left, &least)? * (rows.len() as f64) < CHANCE
+        && !table.is_one_beyond_links(std::slice::from_ref(&rows), apart_mm);
     is_told.then(|| {
         let by = moved_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
         let names = set.names(&other.iter().map(|&i| table.rows[i]).collect::<Vec<usize>>());

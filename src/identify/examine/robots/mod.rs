@@ -5,11 +5,13 @@
 //! Parts are the files of a run, or stretches of rows that are looked for. One robot with a tool and placements of its own in every part is
 //! held against a robot a part. Fisher's test says whether what that gains is beyond chance and the further unknowns (the Chow test: Chow,
 //! 1960), with the number of places that were tried counted in; what is left must fall to half at the least; and the same rows cut along any of
-//! their joints must leave more, for a model that lacks something fits better in every smaller region.
+//! their joints must leave more, for a model that lacks something fits better in every smaller region. One robot with any term beyond its links must
+//! leave twice as much as well.
 //! Rows that are far off by themselves are errors of their own and no part of a state: they are left out first.
 //! Goes wrong: arms that differ by less than the model lacks; parts that alternate row by row; a sensor whose own errors changed between
 //! parts, which looks like another robot.
 
+mod beyond;
 mod fit;
 pub(super) mod loads;
 pub(super) mod tools;
@@ -23,7 +25,7 @@ use crate::identify::examine::hypothesis::still;
 use crate::identify::examine::{sessions, shifted};
 use crate::identify::finding::Finding;
 use crate::identify::sensor::REPEATABILITY_MM;
-use crate::identify::settings::Settings;
+use crate::identify::settings::{Extensions, Settings};
 use crate::robot::Robot;
 use crate::statistics::median;
 
@@ -114,7 +116,7 @@ impl Robots {
 pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots> {
     let table = Table::new(set, robot)?;
     let files = table.files(set);
-    let of_files = (files.len() > 1).then(|| table.judged(files, 1, Table::compared)).flatten();
+    let of_files = (files.len() > 1).then(|| table.judged(files, 1.0, Table::compared)).flatten();
     let (parts, compared) = of_files.or_else(|| table.stretches())?;
     // A sensor that was moved several times is no robot.
     let (cut, along) = sessions::find(set, robot, settings);
@@ -126,6 +128,10 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots>
             return None;
         }
     }
+    // Nor is a robot of which the links alone say too little.
+    if settings.extensions == Extensions::Auto && table.is_one_beyond_links(&parts, compared.apart.scatter_mm()) {
+        return None;
+    }
     Some(Robots { parts: table.parts(set, &parts, &compared), together_mm: compared.together.scatter_mm() })
 }
 
@@ -135,7 +141,7 @@ pub(super) fn of_files(set: &Dataset, robot: &Robot) -> Option<Finding> {
     let files = Some(table.files(set)).filter(|files| files.len() > 1)?;
     // What the links lack of a load, every robot has of its own.
     table.points = table.points.with_load(Vec::new());
-    let (parts, compared) = table.judged(files, 1, Table::compared_as_one)?;
+    let (parts, compared) = table.judged(files, 1.0, Table::compared_as_one)?;
     let parts = table.parts(set, &parts, &compared);
     Some(Finding::new(
         format!(
@@ -243,14 +249,15 @@ impl Table {
     /// The stretches of rows that are of different robots.
     fn stretches(&self) -> Option<Judged> {
         let mut parts: Vec<Vec<usize>> = vec![(0..self.rows.len()).collect()];
-        let mut tried = 0;
+        let mut tried = 1.0;
         while parts.len() < MOST_PARTS {
             let cuts = parts.iter().enumerate().filter_map(|(p, part)| Some((p, self.best_cut(part)?)));
             let cut = cuts.max_by(|a, b| a.1.1.total_cmp(&b.1.1));
             let Some((p, (at, _))) = cut else { break };
             let late = parts[p].split_off(at);
             parts.insert(p + 1, late);
-            tried += self.rows.len();
+            // Each cut is the best of all places, beside each place of those before.
+            tried *= self.rows.len() as f64;
             if let Some(judged) = self.judged(parts.clone(), tried, Table::compared) {
                 return Some(judged);
             }
@@ -280,11 +287,11 @@ impl Table {
     }
 
     /// These parts where they are of different robots, as `compare` has it; `tried` is the number of such cuts that were looked at.
-    fn judged(&self, parts: Vec<Vec<usize>>, tried: usize, compare: Comparing) -> Option<Judged> {
+    fn judged(&self, parts: Vec<Vec<usize>>, tried: f64, compare: Comparing) -> Option<Judged> {
         let compared = compare(self, &parts)?;
         let Compared { apart, together, .. } = &compared;
         if together.scatter_mm() < (MUCH_LARGER * apart.scatter_mm()).max(REPEATABILITY_MM)
-            || by_chance(apart, together)? * tried as f64 > CHANCE
+            || by_chance(apart, together)? * tried > CHANCE
         {
             return None;
         }
