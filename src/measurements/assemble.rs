@@ -247,6 +247,8 @@ impl Taken<'_> {
                 Form::Delimited('\t') => Some("tabs".to_owned()),
                 Form::Delimited(' ') => Some("blanks".to_owned()),
                 Form::Delimited(_) => None,
+                Form::Named(what, 0) => Some((*what).to_owned()),
+                Form::Named(what, others) => Some(format!("{what} ({others} lines hold none)")),
                 Form::Sheet(name, others) if *others > 0 => Some(format!("sheet {name} ({others} more not read)")),
                 Form::Sheet(name, _) => Some(format!("sheet {name}")),
                 Form::Program { others: 0, .. } => Some("a program's lines".to_owned()),

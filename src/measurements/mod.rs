@@ -9,6 +9,7 @@ mod keys;
 mod rows;
 pub mod source;
 mod stuck;
+mod summaries;
 
 pub use crate::csv_table::quoted;
 pub use columns::is_not_near;

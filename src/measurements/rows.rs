@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use camino::Utf8Path;
 use nalgebra::{Matrix3, Point3, Vector3};
 
+use super::summaries;
 use crate::csv_table::{Table, quoted};
 use crate::files::Result;
 
@@ -206,12 +207,12 @@ pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     read_whole(path).map(|(rows, _)| rows)
 }
 
-/// The same with a sentence on rows below the table, such as a mean.
-pub(super) fn read_whole(path: &Utf8Path) -> Result<(Vec<Measurement>, Option<String>)> {
+/// The same with sentences on rows below the table, such as a mean.
+pub(super) fn read_whole(path: &Utf8Path) -> Result<(Vec<Measurement>, Vec<String>)> {
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
     let mut table = Table::read(path, "measurements file", hint)?;
-    let below = table.without_rows_below()?;
-    Ok((from_table(&table)?, below))
+    let below = [table.without_rows_below()?, summaries::taken_away(path, &mut table.rows)?];
+    Ok((from_table(&table)?, below.into_iter().flatten().collect()))
 }
 
 /// Measurements from a table.

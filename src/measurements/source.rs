@@ -97,7 +97,7 @@ impl Source {
                 && is_own(&Part::read(only, count, false)?)
             {
                 let (rows, below) = read_whole(only)?;
-                return Ok(checked(rows, below.into_iter().collect(), robot));
+                return Ok(checked(rows, below, robot));
             }
             parts.push(Part::read(file, count, self.columns.is_some())?);
         }
@@ -116,6 +116,7 @@ impl Source {
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
             said.extend(joined);
+            said.extend(set.iter_mut().filter_map(|part| part.below.take()));
             if way.is_computed() {
                 said.push(
                     "the nominal robot predicts these points to a micrometre: they were computed from the joints, not measured"
@@ -173,6 +174,7 @@ impl Source {
             listed(&parts, &picked.joints),
             unit.word()
         );
+        let said = parts[0].below.iter().fold(said, |said, below| format!("{said}; {below}"));
         Ok(((0..parts[0].rows.len()).map(row).collect::<Result<Vec<_>>>()?, said))
     }
 

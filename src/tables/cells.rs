@@ -8,7 +8,7 @@ use super::fields::Fields;
 use super::names::{Name, Unit, What};
 use super::numbers::is_number;
 
-/// Numbers of the longest list that is a part of a pose: a transform.
+/// Entries of the longest list that is a part of a pose: a transform.
 const LONGEST: usize = 16;
 
 /// Numbers that a line names at the least.
@@ -18,7 +18,7 @@ const NAMED: usize = 3;
 #[derive(Clone, PartialEq)]
 enum Column {
     Plain,
-    /// Lists of so many numbers; of transforms the last column is the point.
+    /// Lists of so many entries; of transforms the last column is the point.
     Lists(usize, bool),
     /// Numbers with this behind them.
     Unit(String),
@@ -142,12 +142,22 @@ pub(super) fn count(cell: &str) -> usize {
     }
 }
 
-/// The numbers of a list in a cell, lists in it one after the other.
-fn list(cell: &str) -> Option<Vec<&str>> {
+/// The numbers of a list in a cell, lists in it one after the other; or its words, where each is in quotes.
+pub(super) fn list(cell: &str) -> Option<Vec<&str>> {
     let inside = cell.strip_prefix(['[', '('])?.strip_suffix([']', ')'])?;
     let between = |c: char| c.is_whitespace() || ",;[]()".contains(c);
     let numbers: Vec<&str> = inside.split(between).filter(|word| !word.is_empty()).collect();
-    ((2..=LONGEST).contains(&numbers.len()) && numbers.iter().all(|word| is_number(word))).then_some(numbers)
+    if !(2..=LONGEST).contains(&numbers.len()) {
+        return None;
+    }
+    if numbers.iter().all(|text| is_number(text)) {
+        return Some(numbers);
+    }
+    numbers.into_iter().map(|text| in_quotes(text, '"').or_else(|| in_quotes(text, '\''))).collect()
+}
+
+fn in_quotes(text: &str, quote: char) -> Option<&str> {
+    text.strip_prefix(quote)?.strip_suffix(quote)
 }
 
 /// A number with a unit behind it, apart.

@@ -49,6 +49,8 @@ pub enum Form {
     Delimited(char),
     /// A sheet of a spreadsheet, and how many others there are.
     Sheet(String, usize),
+    /// Values that have their names beside them: what holds them, and how many lines hold none.
+    Named(&'static str, usize),
     /// Lines of a program, each with one joint target.
     Program {
         /// Lines without a target.

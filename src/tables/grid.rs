@@ -7,12 +7,15 @@
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::called;
 use super::cells;
 use super::fields::{Fields, Form};
+use super::log_lines;
 use super::numbers::Style;
 use super::program_lines;
 use super::source::{self, Source};
 use crate::files::{Error, Result};
+use crate::programs::Language;
 
 /// Columns of the widest table that is read.
 pub const MOST_COLUMNS: usize = 100_000;
@@ -46,11 +49,11 @@ impl Grid {
         Grid::of(path, source::read(path, what, hint)?, None)
     }
 
-    /// The text of a file in whatever encoding; `None` of a spreadsheet.
+    /// The text of a file in whatever encoding; `None` of a spreadsheet and of records.
     pub fn text(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Option<String>> {
         Ok(match source::read(path, what, hint)? {
             Source::Text(text, _) => Some(text),
-            Source::Sheet { .. } => None,
+            Source::Records(_) | Source::Sheet { .. } => None,
         })
     }
 
@@ -60,10 +63,11 @@ impl Grid {
     }
 
     /// Reads a file of readings, which may be a program's: lines that hold a joint target of at least so many numbers are rows of those. Lists, units and
-    /// comments in its cells are read.
+    /// comments in its cells are read, and names of joints in them.
     pub fn read_with_programs(path: &Utf8Path, what: &'static str, hint: &str, joints: usize) -> Result<Grid> {
         let mut grid = Grid::of(path, source::read(path, what, hint)?, Some(joints))?;
         cells::plain(&mut grid.rows, grid.form == Form::Delimited(' '));
+        called::named(&mut grid.rows);
         Ok(grid)
     }
 
@@ -75,7 +79,12 @@ impl Grid {
                 rows.iter().try_for_each(|(line, cells)| grid.push(*line, cells.iter().map(String::as_str)))?;
                 Ok(grid)
             }
+            Source::Records(rows) => Ok(Grid { rows, ..empty(Form::Named("records of JSON", 0), None) }),
             Source::Text(text, encoding) => {
+                let logged = joints.filter(|_| Language::of(path).is_none()).and_then(|_| log_lines::read(&text));
+                if let Some((rows, others)) = logged {
+                    return Ok(Grid { rows, ..empty(Form::Named("lists of a log", others), encoding) });
+                }
                 if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
                     let grid = Grid { rows, ..empty(form, encoding) };
                     if let Form::Program { calls, .. } = &grid.form

@@ -5,21 +5,27 @@
 //!  foreign  what is no table: which program's file it is, and how to export it
 //!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
 //!  cells    a unit, a list, a name or a comment beside the number of a cell
+//!  records  objects of JSON -> rows of cells
+//!  log_lines   lines of a log that name their values -> rows of cells
+//!  called   joints whose names stand in cells -> names of their columns
 //!  numbers  a cell with a decimal comma, or with thousands set apart, as a number
 //!  expression   a cell with a formula, `pi/2`, `q2 - 90`, as a number
 //!  header   where the names of the columns stand, if there are any
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
 //! ```
 
+mod called;
 mod cells;
 pub mod expression;
 mod fields;
 mod foreign;
 pub mod grid;
 pub mod header;
+mod log_lines;
 pub mod names;
 mod numbers;
 mod program_lines;
+mod records;
 mod source;
 
 pub use fields::{Fields, Form};

@@ -236,14 +236,14 @@ fn without(words: &[String], out: &[usize]) -> Vec<String> {
     words.iter().enumerate().filter(|(i, _)| !out.contains(i)).map(|(_, word)| word.clone()).collect()
 }
 
-/// `joint 3`, `q3`, `theta_3_actual`: a word for joints and the only number. The word stays in the key: `q` and `theta` are two sets.
+/// `joint 3`, `q3`, `theta_3_actual`, `fr3_joint3`: a word for joints and the only number behind it. The word stays in the key: `q` and `theta` are
+/// two sets.
 fn joint(words: &[String]) -> Option<(What, Vec<String>)> {
-    let at = words.iter().position(|word| is_in(JOINT, word))?;
-    let numbers: Vec<usize> = (0..words.len()).filter(|&i| words[i].parse::<usize>().is_ok()).collect();
-    let [number] = numbers[..] else { return None };
-    if number < at {
-        return None;
-    }
+    let counted = |at: usize| {
+        let mut numbers = (at + 1..words.len()).filter(|&i| words[i].parse::<usize>().is_ok());
+        numbers.next().filter(|_| numbers.next().is_none()).map(|number| (at, number))
+    };
+    let (at, number) = (0..words.len()).rev().filter(|&i| is_in(JOINT, &words[i])).find_map(counted)?;
     let mut rest = without(words, &[at, number]);
     rest.push(words[at].clone());
     Some((What::Joint(words[number].parse().ok()?), rest))
@@ -321,6 +321,9 @@ mod tests {
             "joint1_pos",
             "JointAngle1",
             "joint[1]",
+            "fr3_joint1",
+            "j2n6s300_joint_1",
+            "joint_a1",
             "Gelenk 1",
             "关节1",
             "关节角1(°)",

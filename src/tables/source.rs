@@ -1,7 +1,7 @@
 //! A file's bytes as text or as the cells of a spreadsheet.
 //!
 //! In: a path, for spreadsheets with `#SHEET` behind it. Out: text decoded from UTF-8, UTF-16 or Latin-1 (as Windows has it, code page
-//! 1252), or cells. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them. A formula whose value the
+//! 1252), or cells, those of JSON's records included. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them. A formula whose value the
 //! spreadsheet does not hold is refused with its cell.
 
 use std::io::{Cursor, Read};
@@ -10,8 +10,10 @@ use calamine::{Data, Reader, Sheets, open_workbook_auto_from_rs};
 use camino::{Utf8Path, Utf8PathBuf};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
+use super::fields::Fields;
 use super::foreign;
 use super::numbers::Style;
+use super::records;
 use crate::files::{Error, Result, unreadable};
 
 /// The longest table that is read, bytes.
@@ -26,6 +28,8 @@ const SEEN: usize = 4096;
 pub(super) enum Source {
     /// Text, and its encoding where that is not UTF-8.
     Text(String, Option<&'static str>),
+    /// Records of JSON.
+    Records(Vec<(u64, Fields)>),
     /// Rows of cells with their line, the sheet's name, and whether there are other sheets.
     Sheet { rows: Vec<(u64, Vec<String>)>, name: String, others: usize },
 }
@@ -61,6 +65,9 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
     }
     if sheet.is_some() {
         return Err(refuse(&file, "a sheet is named behind `#`, but the file is no spreadsheet".to_owned(), None));
+    }
+    if let Some(rows) = std::str::from_utf8(&bytes).ok().and_then(records::read) {
+        return Ok(Source::Records(rows));
     }
     if let Some((kind, hint)) = foreign::of_bytes(&bytes, &file) {
         return Err(refuse(&file, format!("{what}: {kind}, which is not read"), Some(&hint)));

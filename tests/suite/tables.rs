@@ -16,6 +16,7 @@ use crate::run::{shared, stderr, stdout, stereocal, workplace};
 mod doubtful;
 mod forms;
 mod joined;
+mod logs;
 mod owners;
 mod written;
 

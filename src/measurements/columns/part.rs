@@ -3,6 +3,7 @@
 use camino::Utf8Path;
 
 use crate::files::{Error, Result};
+use crate::measurements::summaries;
 use crate::tables::Form;
 use crate::tables::header;
 use crate::tables::names::{Name, Unit, What};
@@ -46,6 +47,8 @@ pub(in crate::measurements) struct Part {
     pub key: Option<usize>,
     /// Rows of the file that stand side by side in each row here.
     pub times: usize,
+    /// What is said of rows that stood below the table.
+    pub below: Option<String>,
 }
 
 /// Cells that say that there is no number.
@@ -67,17 +70,18 @@ impl Part {
                 headed => headed?,
             },
         };
-        let headed = match stacked(&headed.rows).filter(|_| headed.names.is_none()) {
+        let mut headed = match stacked(&headed.rows).filter(|_| headed.names.is_none()) {
             Some(rows) => header::Headed { rows, ..headed },
             None => headed,
         };
+        let below = summaries::taken_away(path, &mut headed.rows)?;
         let width = headed.rows.first().map_or(0, |(_, row)| row.len());
         let kinds = (0..width).map(|column| kind(&headed.rows, column)).collect();
         let mut meanings: Option<Vec<Name>> = headed.names.as_ref().map(|names| understood(names));
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
-        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None, times: 1 };
+        let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None, times: 1, below };
         match part.unread_unit().filter(|_| !named) {
             Some(error) => Err(error),
             None => Ok(part),
