@@ -64,7 +64,8 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
             (Error::Open { .. }, Some(finding)) => Error::OtherRobot { why: finding.finding.clone() },
             (error, _) => error,
         })?;
-    let all = set.rows(|_| true);
+    let is_placed = |row: &usize| located.fit.stray.as_ref().is_none_or(|stray| stray.row != *row);
+    let all: Vec<usize> = set.rows(|_| true).into_iter().filter(is_placed).collect();
     let held_out = folds::judged(&Judge::plain(&set, &all, false), &located.placed.robot, &all);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
     placement.check = match check {
@@ -75,18 +76,15 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let json = out.write_json(PLACEMENT, &content)?;
     let summary = || report::located::summary(&content.placement, &content.fit, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
-    let status = if content.fit.contradicted { Status::OutOfTolerance } else { Status::Done };
+    let is_whole = !content.fit.contradicted && content.fit.stray.is_none();
+    let status = if is_whole { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status: status.or_worse(heeded) })
 }
 
 /// What the points say of the robot's use; `None` where they agree with it.
 fn of_points(fit: &Fit) -> Option<Check> {
-    let (advice, reason) = match fit {
-        Fit { contradicted: true, .. } => (Advice::DoNotUse, Fit::CONTRADICTED),
-        Fit { doubted: true, .. } => (Advice::Check, Fit::DOUBTED),
-        _ => return None,
-    };
-    Some(Check { advice, reason: reason.to_owned(), mended: Vec::new() })
+    let advice = if fit.contradicted { Advice::DoNotUse } else { Advice::Check };
+    Some(Check { advice, reason: fit.objection()?, mended: Vec::new() })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.

@@ -55,6 +55,11 @@ impl Standing {
         if contradicted && self == Standing::StillValid { Standing::Undecided } else { self }
     }
 
+    /// What pairs say that contradict the calibration by themselves, and what they are off by, mm, where this standing is because of them.
+    pub fn contradicted(self, recheck: &Recheck) -> Option<(String, f64)> {
+        recheck.contradiction().filter(|_| self == Standing::Undecided)
+    }
+
     /// With which status a check ends.
     pub fn status(self) -> Status {
         match self {
@@ -88,7 +93,7 @@ pub struct RecheckFile {
     /// One or, not told apart, several with `|`; empty where nothing changed.
     cause: String,
     statement: String,
-    /// By how much the change moves a length, mm.
+    /// By how much the change moves a length, or the pairs that contradict the calibration are off, mm.
     effect_mm: f64,
     /// The largest change of a length that a single cause could make without being seen in nineteen of twenty checks, mm.
     seen_mm: f64,
@@ -97,6 +102,8 @@ pub struct RecheckFile {
 
 impl RecheckFile {
     pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
+        let found = || (recheck.statement(), recheck.effect_mm);
+        let (statement, effect_mm) = standing.contradicted(recheck).unwrap_or_else(found);
         RecheckFile {
             standing,
             tolerance_mm,
@@ -106,8 +113,8 @@ impl RecheckFile {
             pairs_contradicting: recheck.strays.clone(),
             length_mm: recheck.length_mm,
             cause: recheck.cause(),
-            statement: recheck.statement(),
-            effect_mm: recheck.effect_mm,
+            statement,
+            effect_mm,
             seen_mm: recheck.seen_mm,
             causes: recheck.causes.clone(),
         }
@@ -127,7 +134,7 @@ pub struct Check {
     pub standing: Standing,
     /// The cause; empty where nothing changed.
     pub cause: String,
-    /// By how much the change moves a length, or the target of a robot, mm.
+    /// By how much the change moves a length, or the target of a robot, or the pairs that contradict the calibration are off, mm.
     pub effect_mm: f64,
     /// What would have been seen, mm.
     pub seen_mm: f64,

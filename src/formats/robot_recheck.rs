@@ -28,6 +28,8 @@ pub struct RobotRecheckFile {
     seen_mm: f64,
     /// The largest movement of the target by a single cause that these poses leave room for, with a chance of nineteen in twenty, mm.
     at_most_mm: f64,
+    /// The same wherever the robot was identified, mm.
+    elsewhere_mm: f64,
     causes: Vec<CauseSeen>,
     placements: Vec<Moved>,
 }
@@ -35,10 +37,10 @@ pub struct RobotRecheckFile {
 impl RobotRecheckFile {
     pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64, own_data: bool) -> RobotRecheckFile {
         let changed = !recheck.cause().is_empty();
-        let standing = match Standing::of(changed, recheck.effect_mm, recheck.at_most_mm, tolerance_mm) {
+        let standing = match Standing::of(changed, recheck.effect_mm, recheck.room_mm(), tolerance_mm) {
             // Rows from before say nothing of what happened since, whatever they say.
             _ if own_data => Standing::OwnData,
-            _ if !recheck.extrapolated.is_empty() => Standing::Undecided,
+            _ if !recheck.extrapolated.is_empty() || recheck.scatters() => Standing::Undecided,
             Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
             other => other,
         };
@@ -53,8 +55,49 @@ impl RobotRecheckFile {
             effect_mm: recheck.effect_mm,
             seen_mm: recheck.seen_mm,
             at_most_mm: recheck.at_most_mm,
+            elsewhere_mm: recheck.elsewhere_mm,
             causes: recheck.causes.clone(),
             placements: recheck.placements.clone(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A robot of which nothing is off, with what the poses leave room for at them and elsewhere, mm.
+    fn unchanged(at_most_mm: f64, elsewhere_mm: f64) -> Recheck {
+        Recheck {
+            poses: vec!["a".to_owned(); 10],
+            strays: Vec::new(),
+            causes: Vec::new(),
+            changed: false,
+            likeliest: Vec::new(),
+            placements: Vec::new(),
+            effect_mm: 0.0,
+            seen_mm: at_most_mm,
+            at_most_mm,
+            instead: Vec::new(),
+            elsewhere_mm,
+            tolerance_mm: 0.05,
+            by_cameras: true,
+            correction_mm: 0.0,
+            extrapolated: Vec::new(),
+        }
+    }
+
+    /// Poses near to each other rule out a change at them, and none elsewhere; readings that scatter more rule out little and prove no change.
+    #[test]
+    fn a_robot_is_valid_where_it_was_identified_and_scatter_is_no_change() {
+        let standing =
+            |recheck: &Recheck| RobotRecheckFile::new(recheck, Utf8Path::new("r.toml"), 0.05, false).standing;
+        assert_eq!(standing(&unchanged(0.012, 0.04)), Standing::StillValid);
+        assert_eq!(standing(&unchanged(0.012, 1.2)), Standing::Undecided);
+        let likeliest = vec![("scatter".to_owned(), "the readings scatter more".to_owned())];
+        let scattered = Recheck { changed: true, likeliest, effect_mm: 0.14, ..unchanged(0.3, 0.4) };
+        assert!(scattered.scatters() && standing(&scattered) == Standing::Undecided);
+        let unknown = Recheck { likeliest: Vec::new(), ..scattered };
+        assert_eq!(standing(&unknown), Standing::Changed);
     }
 }

@@ -22,12 +22,10 @@ fn line(what: &str, record: &TransformRecord) -> String {
 pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
     let poses = fit.poses;
     let mut lines = Vec::new();
-    if fit.contradicted {
-        lines.push(format!("do not use this placement: {}", Fit::CONTRADICTED));
-    }
-    if fit.doubted {
-        lines.push(format!("check before you use this placement: {}", Fit::DOUBTED));
-    }
+    lines.extend(fit.objection().map(|why| {
+        let use_ = if fit.contradicted { "do not use this placement" } else { "check before you use this placement" };
+        format!("{use_}: {why}")
+    }));
     for group in &placement.groups {
         let sensor = if placement.by_instrument { "instrument" } else { "rig" };
         lines.push(line(&format!("base from {sensor}, {}", group.group), &group.base_from_rig));

@@ -9,7 +9,6 @@ use super::table::{Table, with_sigma};
 use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
-use crate::imaging::corners::named;
 use crate::stereo::recheck::{CauseSeen, Recheck};
 
 /// The verdict in words.
@@ -35,6 +34,9 @@ pub(super) fn tone(standing: Standing) -> Tone {
 /// What was found and what it means, in a sentence.
 fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64) -> String) -> String {
     let length = recheck.length_mm;
+    if let Some((contradicted, _)) = standing.contradicted(recheck) {
+        return contradicted;
+    }
     let found = match recheck.change {
         None => recheck.statement(),
         Some(_) => format!("{}, which moves a length by only {} mm", recheck.statement(), mm(recheck.effect_mm)),
@@ -43,7 +45,6 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64
         Standing::OwnData => {
             "the calibration was made of these pairs, which agree with it whatever happened since".to_owned()
         }
-        Standing::Undecided if !recheck.strays.is_empty() => contradicting(recheck),
         Standing::StillValid | Standing::Undecided => format!(
             "{found}; {} pairs would have shown a change that moves a length of {length} mm by {} mm, tolerance {tolerance_mm} mm",
             recheck.pairs.len(),
@@ -55,37 +56,6 @@ fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64
             mm(recheck.effect_mm)
         ),
     }
-}
-
-/// What pairs mean that contradict the calibration by themselves.
-fn contradicting(recheck: &Recheck) -> String {
-    let pairs = &recheck.pairs;
-    let strays: Vec<String> = recheck.strays.iter().map(|stray| stray.pair.clone()).collect();
-    let strays = strays.as_slice();
-    let effect_mm = recheck.strays.iter().map(|stray| stray.effect_mm).fold(0.0, f64::max);
-    let by = format!("the calibration (a length of {} mm by up to {} mm)", recheck.length_mm, two_digits(effect_mm));
-    let last = pairs.ends_with(strays);
-    match (strays.len() == pairs.len(), last) {
-        (true, _) => {
-            "every pair contradicts the calibration, and no common change explains how: pictures that are turned, exchanged or not taken at one \
-             moment, another board, or a camera that is loose"
-                .to_owned()
-        }
-        (false, true) => format!(
-            "{} {by}, and the pairs before agree with it: the rig moved, or the two pictures were not taken at one moment",
-            subject(strays)
-        ),
-        (false, false) => format!(
-            "{} {by}, and the others agree with it: the two pictures were not taken at one moment, or the rig does not stand still",
-            subject(strays)
-        ),
-    }
-}
-
-/// The pairs with their verb.
-fn subject(strays: &[String]) -> String {
-    let (pairs, verb) = if strays.len() == 1 { ("pair", "contradicts") } else { ("pairs", "contradict") };
-    format!("{pairs} {} {verb}", named(strays))
 }
 
 /// By how much a cause changed, and within what: as many digits as that deserves.
@@ -148,8 +118,12 @@ pub fn page(
     checks: &[Check],
     warnings: &[String],
 ) -> Result<String> {
+    let (effect_mm, of_effect) = match standing.contradicted(recheck) {
+        Some((_, off_mm)) => (off_mm, "error of a length by pairs that contradict"),
+        None => (recheck.effect_mm, "change of a length beyond chance"),
+    };
     let numbers = [
-        (format!("{} mm", two_digits(recheck.effect_mm)), "change of a length beyond chance"),
+        (format!("{} mm", two_digits(effect_mm)), of_effect),
         (format!("{} mm", two_digits(recheck.seen_mm)), "would have been seen"),
         (format!("{tolerance_mm} mm"), "tolerance"),
     ];
@@ -176,7 +150,7 @@ pub fn page(
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
         (page::table(&header("moves a length by, mm"), &rows))
-        (history(checks, tolerance_mm, "Change of a length", "the calibration no longer holds")?)
+        (history(checks, tolerance_mm, "Change of a length", "the calibration no longer holds, or pairs contradict it")?)
     };
     let lead =
         compared(recheck.pairs.len(), "pair", standing, ["the calibration", "the calibration that was made of them"]);

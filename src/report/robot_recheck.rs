@@ -33,12 +33,13 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
         if recheck.changed && standing == Standing::StillValid { "far within the tolerance: " } else { "" };
     let mended = if judged.is_mended { "with the rows mended: " } else { "" };
     let statement = format!("{mended}{far_within}{}", recheck.statement());
-    let of_rest = match recheck.cause().is_empty() {
+    let of_rest = match recheck.is_open() {
         true => format!(
-            "{statement}; these {} poses leave room for a single cause that moves the target by up to {} mm (95 %), tolerance {tolerance} mm, and \
-             see each one that moves it by {} mm in 19 of 20 such checks{}",
+            "{statement}; these {} poses leave room for a single cause that moves the target by up to {} mm at them and {} mm elsewhere where the robot \
+             was identified (95 %), tolerance {tolerance} mm, and see each one that moves it by {} mm at them in 19 of 20 such checks{}",
             recheck.poses.len(),
             mm(recheck.at_most_mm),
+            mm(recheck.elsewhere_mm),
             mm(recheck.seen_mm),
             recheck.unseen().map_or_else(String::new, |unseen| format!(", and nothing of: {unseen}"))
         ),
@@ -67,8 +68,11 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
         Standing::Undecided if !recheck.extrapolated.is_empty() => {
             "check with poses inside these ranges, or identify anew with poses of both"
         }
+        Standing::Undecided if recheck.scatters() => {
+            "measure a pose twice: readings that differ are the instrument's, joint angles want their decimals, and what only differs after other motions is play; mend it, and check again"
+        }
         Standing::Undecided => {
-            "add poses that bend every joint and turn the wrist, or say with --tolerance-mm what matters: these do not rule out a change as large as the tolerance"
+            "add poses spread over the workspace, which bend every joint and turn the wrist, or say with --tolerance-mm what matters: these do not rule out a change as large as the tolerance"
         }
         Standing::OwnData => "measure ten new poses",
         _ if !recheck.changed && !recheck.instead.is_empty() => {
@@ -161,8 +165,8 @@ pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -
 /// The report. Also shows the run's `warnings`.
 pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[String]) -> Result<String> {
     let Judged { standing, tolerance_mm, .. } = judged;
-    let of_target = match recheck.cause().is_empty() {
-        true => (recheck.at_most_mm, "movement of the target that is not ruled out"),
+    let of_target = match recheck.is_open() {
+        true => (recheck.room_mm(), "movement of the target that is not ruled out"),
         false => (recheck.effect_mm, "movement of the target beyond chance"),
     };
     let numbers = [of_target, (recheck.seen_mm, "would have been seen"), (tolerance_mm, "tolerance")]

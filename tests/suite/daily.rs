@@ -156,6 +156,24 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
             && history.lines().nth(2).unwrap().contains(",changed,")
     );
     assert!(std::fs::read_to_string(at.join("out/recheck.html")).unwrap().contains("Over time"));
+    // One pair that contradicts the others: terminal, file, page and history say by how much.
+    let [of_three, of_turned] = ["three.csv", "turned.csv"].map(|file| std::fs::read_to_string(at.join(file)).unwrap());
+    let last = of_three.lines().last().and_then(|line| line.split(',').next()).unwrap();
+    let lines = of_three.lines().zip(of_turned.lines());
+    let one: Vec<&str> = lines.map(|(a, b)| if a.starts_with(&format!("{last},")) { b } else { a }).collect();
+    std::fs::write(at.join("last.csv"), one.join("\n")).unwrap();
+    let (status, said, messages) = check("last.csv");
+    assert_eq!(status, Some(1), "{said}{messages}");
+    let file = json(&at.join("out/recheck.json"));
+    let statement = file["statement"].as_str().unwrap();
+    assert!(statement.contains(&format!("pair {last} contradicts the calibration")), "{statement}");
+    assert!(said.starts_with(&format!("UNDECIDED: {statement}\n")), "{said}");
+    assert_eq!(file["effect_mm"], file["pairs_contradicting"][0]["effect_mm"]);
+    assert!(file["effect_mm"].as_f64().unwrap() > 1.0, "{file}");
+    let page = std::fs::read_to_string(at.join("out/recheck.html")).unwrap();
+    assert!(page.contains("error of a length by pairs that contradict") && !page.contains("<b>0 mm</b>"));
+    let history = std::fs::read_to_string(at.join("out/recheck.csv")).unwrap();
+    assert!(history.lines().last().is_some_and(|line| !line.contains(",0.000000,")), "{history}");
     // The pictures of the left camera for those of the right one are no change of the rig.
     let other_side = |line: &str| match line.split(',').nth(1) {
         Some("left") => line.replacen(",left,", ",right,", 1),

@@ -110,7 +110,8 @@ fn compared(
     let found = recheck(set, robot, before, placed)?;
     let Outside { joints, rows } = beyond::outside(against, robot, set, &set.rows(|_| true));
     let is_outside = |cause: &str| joints.iter().any(|(joint, _)| cause == format!("joint-{}", joint + 1));
-    let is_lacking = found.likeliest.is_empty() || found.likeliest.iter().any(|(cause, _)| is_outside(cause));
+    let is_unexplained = found.likeliest.is_empty() || found.scatters();
+    let is_lacking = is_unexplained || found.likeliest.iter().any(|(cause, _)| is_outside(cause));
     let is_small = found.changed && is_lacking && found.effect_mm <= found.correction_mm;
     let outside: Vec<usize> = joints.iter().map(|(joint, _)| *joint).collect();
     let goes = || recheck(set, robot, &before.outside(&outside), placed).is_ok_and(|beyond| beyond.cause().is_empty());

@@ -4,17 +4,20 @@
 //! against what is stated of readings and robot, and covariances that hold for few poses: a scatter that these poses themselves had to tell is
 //! made larger by Student's quantile over the normal one. What an identification left open of the robot is part of them: all poses share it, and
 //! placements and target follow it. Without orientations, and where the points leave the target's place open, it is held
-//! as the robot's file has it. Goes wrong: poses that leave a direction open are refused with that direction; a robot that is wrong in a
-//! way that a placement can take up is not seen.
+//! as the robot's file has it. One row without which the others agree is named and left out. Goes wrong: poses that leave a direction open are refused
+//! with that direction; a robot that is wrong in a way that a placement can take up is not seen.
 
 mod agreement;
+mod stray;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use self::agreement::{Agreement, Misfit, agreement, misfit};
+use self::stray::{Stray, alone};
 use super::placement::{Placed, is_held};
+use crate::diagnostic::two_digits;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::residuals::rows::Rows;
@@ -66,8 +69,11 @@ pub struct Located {
 /// How the points agree with the robot.
 #[derive(Debug, Clone, Serialize)]
 pub struct Fit {
-    /// Poses that were given.
+    /// Poses that were placed.
     pub poses: usize,
+    /// The row that contradicts them, and is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stray: Option<Stray>,
     /// Root mean square of a point's residual, mm.
     pub rms_mm: f64,
     /// Squared residuals of points over what is stated of them.
@@ -90,6 +96,27 @@ impl Fit {
     /// What it means where the instrument's noise is not known.
     pub const DOUBTED: &str = "the points miss this robot by more than it is known to scatter, and these rows do not tell whether robot or \
                                instrument is off: state the points' covariances, or take more poses";
+
+    /// What either means of rows of which all but any one agree.
+    pub const TOO_FEW: &str = "these rows contradict each other as this robot takes them, and are too few to tell whether one of them, the robot or \
+                               the instrument is off: take two poses more";
+
+    /// What speaks against the placement, for a person; `None` where nothing does.
+    pub fn objection(&self) -> Option<String> {
+        // A row has three numbers.
+        let is_told = self.freedom > 3;
+        match (self.contradicted || self.doubted, &self.stray) {
+            (true, _) if !is_told => Some(Fit::TOO_FEW.to_owned()),
+            (true, _) => Some(if self.contradicted { Fit::CONTRADICTED } else { Fit::DOUBTED }.to_owned()),
+            (false, Some(stray)) => Some(format!(
+                "row {} contradicts the others by {} mm and is left out, without it they agree with the robot: look at its point and its joints, or \
+                 take it again",
+                stray.pose,
+                two_digits(stray.off_mm)
+            )),
+            (false, None) => None,
+        }
+    }
 }
 
 /// Finds it; `open` where an identification says what it left open of this robot.
@@ -106,13 +133,22 @@ pub fn locate(
     let extras = set.target_unknowns(oriented);
     let model = if oriented { Model::Pose } else { Model::Position };
     let with = |parameters| Task { extras, model, ..Task::plain(set, robot, parameters, &rows, settings) };
-    match fitted(&with(&tool), trust, open) {
+    match one_left_out(&with(&tool), trust, open) {
         // Points alone may leave open what the file says.
         Err(Error::Open { .. } | Error::TooFew { .. } | Error::NothingDetermined { .. }) if !oriented => {
-            fitted(&with(&[]), trust, open)
+            one_left_out(&with(&[]), trust, open)
         }
         located => located,
     }
+}
+
+/// Of the rows, without one that alone contradicts the others.
+fn one_left_out(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located, Error> {
+    let stray = alone(task, trust.point_mm, FEWEST_POSES);
+    let is_left = |row: &usize| stray.as_ref().is_none_or(|stray| stray.row != *row);
+    let rows: Vec<usize> = task.rows.iter().copied().filter(is_left).collect();
+    let located = fitted(&Task { rows: &rows, ..*task }, trust, open)?;
+    Ok(Located { fit: Fit { stray, ..located.fit }, ..located })
 }
 
 fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located, Error> {
@@ -151,7 +187,8 @@ fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located,
     let Misfit { chi_square, freedom, rms_mm } = of_points;
     let agreement = agreement(task, trust.point_mm, of_points);
     let fit = Fit {
-        poses: task.set.poses.len(),
+        poses: task.rows.len(),
+        stray: None,
         rms_mm,
         chi_square,
         freedom,

@@ -4,7 +4,7 @@
 //! [`crate::stereo::board_pose::series`] finds of a run is compared with it. Pictures that were triggered have one, those of a board that is held by
 //! hand more. Method: Rao's score of a change of `right_from_left` at each pair, as for the poses of a run.
 
-use nalgebra::{DMatrix, Vector6};
+use nalgebra::DMatrix;
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::answer::POSE_LIMIT;
@@ -42,19 +42,19 @@ pub fn stray_limit(farthest_pair: Option<f64>) -> f64 {
     POSE_LIMIT.max(BEYOND * farthest_pair.unwrap_or(0.0))
 }
 
-/// The pairs that contradict a rig that they did not help to find, at the values of the problem, with the change of `right_from_left` at the pair alone
-/// that gains more than pairs of this rig are known to differ by. `rig` is the rig's covariance in the layout's order.
+/// The pairs that contradict a rig that they did not help to find, at the values of the problem: a change of `right_from_left` at the pair alone gains
+/// more than pairs of this rig are known to differ by. `rig` is the rig's covariance in the layout's order.
 pub fn strays(
     problem: &Problem,
     board: &Board,
     layout: &Layout,
     rig: &DMatrix<f64>,
     (excess, farthest_pair): (f64, Option<f64>),
-) -> Vec<(usize, Vector6<f64>)> {
+) -> Vec<usize> {
     let gains = gains(problem, board, layout, of_outsider, |_| Some(rig.clone())).unwrap_or_default();
     let beyond = |change: &Change| change.fall > stray_limit(farthest_pair) * excess;
-    let of_pair = |(pair, change): (usize, Option<Change>)| change.filter(beyond).map(|c| (pair, c.change));
-    gains.into_iter().enumerate().filter_map(of_pair).collect()
+    let of_pair = |(pair, change): (usize, &Option<Change>)| change.as_ref().filter(|c| beyond(c)).map(|_| pair);
+    gains.iter().enumerate().filter_map(of_pair).collect()
 }
 
 /// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own

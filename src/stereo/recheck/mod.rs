@@ -8,16 +8,17 @@
 //! is seen in nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
 //! see a focus; that is what the stated figures say.
 
+mod strays;
 #[cfg(test)]
 mod tests;
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+pub use self::strays::Stray;
 use crate::difference::{Difference, SEEN, TOLD_APART};
 use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
-use crate::stereo::board_pose::pair_excess;
 use crate::stereo::data::{Noise, View, in_use};
 use crate::stereo::findings::hypothesis::{self, Hypothesis};
 use crate::stereo::init::board_pose::{self, misfit_px};
@@ -77,14 +78,6 @@ pub struct CauseSeen {
     pub seen: f64,
     /// By how much that one moves a length, mm.
     pub seen_mm: f64,
-}
-
-/// A pair that contradicts the old rig by itself.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Stray {
-    pub pair: String,
-    /// By how much a rig that agrees with it has another length, mm.
-    pub effect_mm: f64,
 }
 
 /// What explains a change.
@@ -173,9 +166,7 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     };
     let seen_mm = causes.iter().map(|cause| cause.seen_mm).fold(0.0, f64::max);
     let pairs = views.iter().map(|view| view.pair.clone()).collect();
-    let place = hypothesis::any_place(&layout);
-    let of_place = |change: Vector6<f64>| moves(&place.iter().zip(&change).map(|(by, amount)| by * *amount).sum());
-    let strays = strays(before, (&solved, &problem.values), &layout, &corners.board, of_place);
+    let strays = strays(before, (&solved, &problem.values), &layout, &corners.board, &lengths);
     Ok(Recheck { pairs, skipped, strays, length_mm, causes, change, effect_mm, seen_mm })
 }
 
@@ -186,7 +177,7 @@ fn strays(
     (solved, old): (&Solved, &Values),
     layout: &Layout,
     board: &Board,
-    effect_mm: impl Fn(Vector6<f64>) -> f64,
+    lengths: &VolumeLengths,
 ) -> Vec<Stray> {
     let mut problem = solved.problem.clone();
     problem.values = old.clone();
@@ -200,8 +191,7 @@ fn strays(
     }
     let Some(rig) = before.covariance(layout) else { return Vec::new() };
     let usual = (before.pair_excess, before.farthest_pair);
-    let strays = pair_excess::strays(&problem, board, layout, &rig, usual).into_iter();
-    strays.map(|(i, change)| Stray { pair: problem.views[i].pair.clone(), effect_mm: effect_mm(change) }).collect()
+    strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 
 /// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the other side.
@@ -355,6 +345,12 @@ impl Recheck {
             Some(Explained::Nothing) => Cause::Unknown.word().to_owned(),
             Some(Explained::Causes(_)) => Cause::words(self.likeliest().iter().map(|cause| cause.cause)),
         }
+    }
+
+    /// What pairs mean that contradict the old rig by themselves, for a person, and what they are off by, mm; `None` where there are none.
+    pub fn contradiction(&self) -> Option<(String, f64)> {
+        let said = || (strays::statement(&self.strays, &self.pairs, self.length_mm), strays::largest_mm(&self.strays));
+        (!self.strays.is_empty()).then(said)
     }
 
     /// What changed, for a person.

@@ -15,7 +15,7 @@ use crate::identify::solve::task::Task;
 use crate::linear_algebra::{product, pseudo_inverse};
 
 /// Chance that a robot that agrees is said to contradict the points.
-const FALSE_ALARM: f64 = 0.01;
+pub const FALSE_ALARM: f64 = 0.01;
 
 /// Chance beyond which what the geometry explains of a misfit is not called noise.
 const EXPLAINED: f64 = 0.05;
@@ -39,19 +39,36 @@ pub enum Agreement {
     Contradicted,
 }
 
+impl Misfit {
+    /// Whether it is no more than what is stated and known lets expect.
+    pub fn is_known(&self) -> bool {
+        let law = ChiSquared::new(self.freedom as f64);
+        !law.is_ok_and(|law| law.cdf(self.chi_square) > 1.0 - FALSE_ALARM)
+    }
+}
+
 /// With the target's place and the frames fitted to the points alone.
 pub fn misfit(task: &Task, robot_mm: f64, offsets: &[f64]) -> Misfit {
+    fitted(&of_points(task, robot_mm), offsets.to_vec(), |_, _| task.parameters.len()).0
+}
+
+/// The same from the target's place in the robot's file on, with the offsets there and the rows.
+pub fn at_best(task: &Task, robot_mm: f64) -> (Misfit, Vec<f64>, Rows) {
+    let rows = of_points(task, robot_mm);
+    let (misfit, at) = fitted(&rows, vec![0.0; rows.offset_count()], |_, _| task.parameters.len());
+    (misfit, at, rows)
+}
+
+fn of_points(task: &Task, robot_mm: f64) -> Rows {
     // Orientations weigh nothing.
     let scatter = Scatter { rotation_rad: 1e3, ..Scatter::of_point(robot_mm) };
-    let rows = task.rows_at(scatter, task.robot);
-    fitted(&rows, offsets.to_vec(), |_, _| task.parameters.len())
+    task.rows_at(scatter, task.robot)
 }
 
 /// What a misfit says of the robot.
 pub fn agreement(task: &Task, robot_mm: f64, found: Misfit) -> Agreement {
     let freedom = found.freedom as f64;
-    let more_than_known = ChiSquared::new(freedom).is_ok_and(|law| law.cdf(found.chi_square) > 1.0 - FALSE_ALARM);
-    if !more_than_known {
+    if found.is_known() {
         return Agreement::Agrees;
     }
     if task.rows.iter().all(|&row| task.set.poses[row].reading.covariance_mm2().is_some()) {
@@ -60,7 +77,7 @@ pub fn agreement(task: &Task, robot_mm: f64, found: Misfit) -> Agreement {
     let geometry = task.robot.mdh_parameters();
     let task = Task { parameters: &geometry, extras: &[], model: Model::Position, ..*task };
     let rows = task.rows_at(Scatter::of_point(robot_mm), task.robot);
-    let explained = fitted(&rows, vec![0.0; geometry.len()], rank);
+    let (explained, _) = fitted(&rows, vec![0.0; geometry.len()], rank);
     let (left, of_geometry) = (explained.freedom as f64, freedom - explained.freedom as f64);
     let gain = (found.chi_square - explained.chi_square) / of_geometry / (explained.chi_square / left);
     let noise = FisherSnedecor::new(of_geometry, left).is_ok_and(|law| law.cdf(gain) < 1.0 - EXPLAINED);
@@ -82,8 +99,8 @@ fn rank(rows: &Rows, at: &[f64]) -> usize {
     (pseudo_inverse(normal.clone()) * normal).trace().round() as usize
 }
 
-/// The residuals that are left at the best offsets, from these on.
-fn fitted(rows: &Rows, mut at: Vec<f64>, unknowns: impl Fn(&Rows, &[f64]) -> usize) -> Misfit {
+/// The residuals that are left at the best offsets, from these on, and those offsets.
+fn fitted(rows: &Rows, mut at: Vec<f64>, unknowns: impl Fn(&Rows, &[f64]) -> usize) -> (Misfit, Vec<f64>) {
     let mut chi_square = f64::INFINITY;
     for _ in 0..20 {
         let (residuals, jacobian) = rows.evaluate(&at, true);
@@ -100,5 +117,5 @@ fn fitted(rows: &Rows, mut at: Vec<f64>, unknowns: impl Fn(&Rows, &[f64]) -> usi
     let squares: Vec<f64> = rows.raw(&at).into_iter().filter_map(square).collect();
     let rms_mm = (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt();
     let fitted = unknowns(rows, &at) + 6 * rows.blocks.len();
-    Misfit { chi_square, freedom: (3 * squares.len()).saturating_sub(fitted), rms_mm }
+    (Misfit { chi_square, freedom: (3 * squares.len()).saturating_sub(fitted), rms_mm }, at)
 }

@@ -70,6 +70,54 @@ fn a_robot_that_contradicts_the_points_is_said() {
     }
 }
 
+/// A point that was misread, and the joints of another pose.
+#[test]
+fn a_row_that_alone_contradicts_the_others_is_named_and_left_out() {
+    let (mut told, mut wrong) = (0, Vec::new());
+    for (count, is_stated) in [(6, true), (6, false), (12, true), (12, false)] {
+        for seed in 0..4 {
+            let (truth, mut all) = rows(count + 1, 0.02, false, 20 + seed);
+            if !is_stated {
+                synthetic::state(&mut all, |_| None);
+            }
+            let trust = if is_stated { EXACT } else { Trust { point_mm: 0.02, rotation_rad: None } };
+            let at = seed as usize + 1;
+            let placed = |rows: &[Measurement]| {
+                locate(&Dataset::new(rows).unwrap(), &truth, trust, None, &Settings::default()).unwrap()
+            };
+            let (clean, other) = (all[..count].to_vec(), all[count].at.joints_deg.clone());
+            let [mut misread, mut exchanged, mut rest] = [(); 3].map(|()| clean.clone());
+            synthetic::point(&mut misread[at]).x += 4.0;
+            exchanged[at].at.joints_deg = other;
+            rest.remove(at);
+            let (of_clean, of_rest) = (placed(&clean).fit, placed(&rest));
+            let shift = |located: &Located| located.placed.groups[0].1.translation.vector;
+            let is_clean = of_clean.stray.is_none() && of_clean.objection().is_none();
+            for (what, rows) in [("misread", misread), ("exchanged", exchanged)] {
+                let found = placed(&rows);
+                let name = found.fit.stray.as_ref().map(|stray| stray.pose.clone());
+                let is_named = name.as_ref() == Some(&clean[at].at.pose);
+                let said = found.fit.objection().unwrap_or_default();
+                told += usize::from(is_named && is_clean && said.contains("is left out, without it they agree"));
+                if !is_named {
+                    wrong.push(format!("{count} {is_stated} {seed} {what}: {name:?} {said}"));
+                    continue;
+                }
+                assert_eq!(found.fit.poses, count - 1);
+                assert!((shift(&found) - shift(&of_rest)).norm() < 1e-3, "{} {}", shift(&found), shift(&of_rest));
+                let off_mm = found.fit.stray.unwrap().off_mm;
+                assert!(what == "exchanged" || (off_mm - 4.0).abs() < 2.0, "{off_mm}");
+            }
+        }
+    }
+    assert!(told >= 28, "{told} of 32: {wrong:?}");
+    // Of four rows any three agree.
+    let (truth, mut four) = rows(4, 0.02, false, 20);
+    synthetic::point(&mut four[1]).x += 4.0;
+    let fit = locate(&Dataset::new(&four).unwrap(), &truth, EXACT, None, &Settings::default()).unwrap().fit;
+    assert!(fit.stray.is_none() && (fit.freedom > 3 || fit.objection().unwrap().contains("are too few")), "{fit:?}");
+}
+
 /// An instrument about which nothing is stated may be as coarse as it is: only what a robot's geometry explains beyond that speaks against the robot.
 #[test]
 fn noise_that_nobody_stated_is_no_fault_of_the_robot() {

@@ -11,6 +11,9 @@ use crate::robot::Parameter;
 /// Chance that a robot that did not change is said to have changed.
 pub(super) const FALSE_ALARM: f64 = 0.01;
 
+/// The word for files of readings that scatter more than at the identification.
+pub(super) const SCATTER: &str = "scatter";
+
 /// The robot as it was.
 #[derive(Debug, Clone)]
 pub struct Before {
@@ -145,6 +148,21 @@ impl Recheck {
         }
     }
 
+    /// Whether the readings scatter more than they did, and that is all that they show.
+    pub fn scatters(&self) -> bool {
+        self.likeliest.iter().any(|(word, _)| word == SCATTER)
+    }
+
+    /// Whether no change is told: figures are then those of what one may be.
+    pub fn is_open(&self) -> bool {
+        self.scatters() || self.cause().is_empty()
+    }
+
+    /// The largest movement of the target by a single cause that is not ruled out, at these poses and wherever the robot was identified, mm.
+    pub fn room_mm(&self) -> f64 {
+        self.at_most_mm.max(self.elsewhere_mm)
+    }
+
     /// The rows that fit far worse than the rest, for a person; `None` where there are none.
     pub fn of_strays(&self) -> Option<String> {
         match &self.strays[..] {
@@ -203,7 +221,7 @@ impl Recheck {
 
     /// Whether the poses rule out that the robot changed: in place of the sensor that moved, and beside it by as much as matters.
     pub fn is_same(&self) -> bool {
-        !self.changed && self.instead.is_empty() && self.at_most_mm.max(self.elsewhere_mm) <= self.tolerance_mm
+        !self.changed && self.instead.is_empty() && self.room_mm() <= self.tolerance_mm
     }
 
     /// Of placements that moved, or seem to.
@@ -214,7 +232,7 @@ impl Recheck {
             (_, true) => format!(
                 "{stands} elsewhere, or the zero of joint 1 moved: {moved}; whether the robot changed as well these poses leave open, by up to {:.4} mm \
                  where it was identified",
-                self.at_most_mm.max(self.elsewhere_mm)
+                self.room_mm()
             ),
             (_, false) => format!(
                 "{stands} elsewhere, or the zero of joint 1 moved ({moved}), or the robot changed: {}; these poses do not tell which",

@@ -44,7 +44,7 @@ impl<'a> Looks<'a> {
         FALSE_ALARM / (self.suspects.len() + 1) as f64
     }
 
-    fn is_seen(&self, suspect: &Suspect) -> bool {
+    pub(super) fn is_seen(&self, suspect: &Suspect) -> bool {
         let is_large = suspect.columns.iter().all(|&(at, _)| self.look.columns.column(at).norm() > UNSEEN);
         let seen_rad = |direction: &DVector<f64>| {
             let along = self.look.difference.along(direction);

@@ -5,7 +5,8 @@
 //! would have shown. Method: the residuals at the old robot, placements (and the target's turn) eliminated, are normal with the covariance of
 //! readings, scatter and old parameters; a zero of one joint, another tool and another scale are directions of theirs
 //! ([`crate::difference`]), all looks together at one level. Where the robot did not change, each placement is compared with the old one.
-//! Rows that fit far worse than the rest are named and left out. Goes wrong: what a placement takes up (the first joint's zero) is only seen as a sensor that moved; two joints at once are a cause unknown.
+//! Rows that fit far worse than the rest are named and left out; readings that only scatter more are said to.
+//! Goes wrong: what a placement takes up (the first joint's zero) is only seen as a sensor that moved; two joints at once are a cause unknown.
 
 mod along;
 mod compared;
@@ -13,6 +14,7 @@ mod comparison;
 mod found;
 mod looks;
 mod moves;
+mod scatter;
 mod strays;
 mod suspects;
 #[cfg(test)]
@@ -38,5 +40,7 @@ pub fn recheck(set: &Dataset, robot: &Robot, before: &Before, stood: Stood) -> R
     let oriented = set.has_rotations() && before.trust.rotation_rad.is_some();
     let comparison = Comparison { set, robot, before, stood, parameters, oriented };
     let whole = comparison.said(&used)?;
-    Ok(strays::left_out(&comparison, &used, &whole).unwrap_or(whole.recheck))
+    let by_rows =
+        || strays::left_out(&comparison, &used, &whole).or_else(|| scatter::larger(&comparison, &used, &whole));
+    Ok(by_rows().unwrap_or(whole.recheck))
 }

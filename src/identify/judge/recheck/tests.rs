@@ -12,6 +12,7 @@ use crate::identify::synthetic;
 use crate::measurements::Measurement;
 
 mod near;
+mod scatter;
 
 const NOISE_MM: f64 = 0.03;
 const NOISE_RAD: f64 = 2e-4;
