@@ -28,7 +28,7 @@ impl Table {
         let links = Terms { chain: Chain::Mdh, ..Terms::NOMINAL };
         let weights = self.points.without_gross(parts);
         // From where the links end: far from there a term that hardly differs from a link's runs away.
-        let near = self.points.solved(parts, &weights);
+        let (_, near) = self.points.solved(parts, &weights);
         links.successors(robot).into_par_iter().any(|terms| {
             let more = terms.parameters(robot).into_iter().filter(|p| !self.points.parameters.contains(p));
             let left = self.points.with_terms(more).together_from(parts, &weights, &near);

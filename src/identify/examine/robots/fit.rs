@@ -104,12 +104,27 @@ impl Left {
 impl Points {
     /// One robot for all parts.
     pub(super) fn together(&self, parts: &[Vec<usize>], weights: &[f64]) -> Left {
-        self.fitted(parts, self.at_file(parts), STEPS, weights.to_vec(), &mut |_, _| ()).0
+        self.solved(parts, weights).0
     }
 
-    /// Where one robot for all parts ends.
-    pub(super) fn solved(&self, parts: &[Vec<usize>], weights: &[f64]) -> DVector<f64> {
-        self.fitted(parts, self.at_file(parts), STEPS, weights.to_vec(), &mut |_, _| ()).1
+    /// The same, and where it ends. A part by itself hardly tells its tool from its placement, and from a file that is far off the steps may end
+    /// in between: so from the robot of all rows with one tool as well.
+    pub(super) fn solved(&self, parts: &[Vec<usize>], weights: &[f64]) -> (Left, DVector<f64>) {
+        let from = |parts: &[Vec<usize>], start| self.fitted(parts, start, STEPS, weights.to_vec(), &mut |_, _| ());
+        let of_file = from(parts, self.at_file(parts));
+        if parts.len() == 1 {
+            return of_file;
+        }
+        let whole = [parts.concat()];
+        let (_, one) = from(&whole, self.at_file(&whole));
+        let of_links = self.parameters.len() - TARGET;
+        let mut start = of_file.1.clone();
+        start.rows_mut(0, of_links).copy_from(&one.rows(0, of_links));
+        for part in 0..parts.len() {
+            start.rows_mut(of_links + TARGET * part, TARGET).copy_from(&one.rows(of_links, TARGET));
+        }
+        let of_one = from(parts, start);
+        if of_one.0.scatter_mm() < of_file.0.scatter_mm() { of_one } else { of_file }
     }
 
     /// One robot for all parts, from where one without the last parameters before the target's place ended.

@@ -158,19 +158,36 @@ fn what_a_model_lacks_makes_no_robots_and_moves_no_tool() {
 /// Spheres one after the other by an arm one joint of which turns by so many thousandths more than it reads.
 #[test]
 fn a_joint_that_reads_too_much_makes_no_robots() {
-    let mut said = 0;
-    for (seed, joint, per_mille) in [(0, 2, 0.5), (1, 2, 1.0), (2, 1, 1.0), (3, 2, 3.0), (4, 3, 3.0)] {
+    const NOISE_MM: f64 = 0.005;
+    for (seed, joint, per_mille) in [(0, 2, 1.0), (1, 2, 3.0), (2, 1, 1.0), (3, 2, 3.0), (4, 3, 3.0)] {
         let mut world =
-            planned(76, 0, 25.0, 0.005, seed, &|robot| robot.add(Parameter::Coupling(joint, joint), per_mille));
+            planned(76, 0, 25.0, NOISE_MM, seed, &|robot| robot.add(Parameter::Coupling(joint, joint), per_mille));
         world.rows.retain(|row| row.at.role != Role::Center);
         world.rows.sort_by(|a, b| a.at.group.cmp(&b.at.group));
         let set = Dataset::new(&world.rows).unwrap();
-        assert_eq!(found(&set, &world.nominal), None, "joint {}, {per_mille} per mille", joint + 1);
-        let links = Settings { extensions: Extensions::None, ..Settings::default() };
-        said += usize::from(find(&set, &world.nominal, &links).is_some());
+        let what = format!("joint {}, {per_mille} per mille", joint + 1);
+        assert_eq!(found(&set, &world.nominal), None, "{what}");
+        // The links alone leave far more than noise, the joint's scale does not.
+        let table = Table::new(&set, &world.nominal).unwrap();
+        let rows = [(0..table.rows.len()).collect::<Vec<usize>>()];
+        let links_mm = table.points.together(&rows, &vec![1.0; rows[0].len()]).scatter_mm();
+        assert!(links_mm > MUCH_LARGER * NOISE_MM, "{what}: {links_mm}");
+        assert!(table.is_one_beyond_links(&rows, NOISE_MM), "{what}");
     }
-    // Where no such term may be kept, the rows are not of one robot.
-    assert!(said > 0);
+}
+
+#[test]
+fn tools_of_their_own_leave_no_more_than_one_tool_does() {
+    for seed in 0..4 {
+        let world = arm(150, 3.0, 33.0, seed);
+        let (set, robot) = tables(std::slice::from_ref(&world), false);
+        let table = Table::new(&set, &robot).unwrap();
+        let count = table.rows.len();
+        let parts: Vec<Vec<usize>> = [0, 8, 17, 46, count].windows(2).map(|cut| (cut[0]..cut[1]).collect()).collect();
+        let weights = vec![1.0; count];
+        let [several, one] = [parts, vec![(0..count).collect()]].map(|p| table.points.together(&p, &weights).squares);
+        assert!(several < 1.001 * one, "seed {seed}: {several} {one}");
+    }
 }
 
 #[test]
