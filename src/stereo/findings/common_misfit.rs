@@ -4,9 +4,10 @@
 //! was said, or else, where they miss their rig by several times what each camera leaves of its own pictures, pictures that were
 //! not taken at one moment. Method: one camera alone takes up much of a board that is too wide in the place that it gives it, two cameras
 //! cannot; the ratio of width and height that the pairs ask for is looked for, all poses and the rig solved again, and it is the cause where the
-//! misfit goes with it. The size of the squares itself no pictures tell. Goes wrong: both at once are told as the second.
+//! misfit goes with it. The size of the squares itself no pictures tell. Goes wrong: both at once are told as the one that explains more.
 
 use rayon::prelude::*;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::{Along, Finding, Kind};
 use crate::imaging::Side;
@@ -31,6 +32,13 @@ const SMALL: f64 = 1e-4;
 const MOST_ROUNDS: usize = 6;
 const STILL: f64 = 1e-7;
 
+/// Most of the misfit that a board may leave where pictures that were not taken at one moment would explain all of it. One number of sixteen that a
+/// rig has takes up little of what has another cause.
+const BESIDE_LATE: f64 = 0.5;
+
+/// Chance with which what pairs miss their rig by for another reason may look like a board's sides.
+const CHANCE: f64 = 1e-3;
+
 /// No printer stretches a board by more.
 const MOST_STRETCH: f64 = 0.1;
 
@@ -40,12 +48,11 @@ pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     let misfit = misfit_without(calibration, changes.iter().find_map(told));
     // As the refinement states it; zero where it gave none.
     let corner_sigma_px = median(in_use(&calibration.views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt()));
-    if misfit.usual_px < TIMES * corner_sigma_px.unwrap_or(0.0) {
-        return None;
-    }
+    let corner_sigma_px = corner_sigma_px.unwrap_or(0.0);
     let missed = Missed { alone_px: calibration.alone_px, paired_px: misfit.usual_px };
-    other_sides(calibration, &misfit)
-        .or_else(|| missed.is_of_two_moments().then(|| not_simultaneous(calibration.alone_px, misfit)))
+    let is_late = misfit.usual_px >= TIMES * corner_sigma_px && missed.is_of_two_moments();
+    other_sides(calibration, &misfit, corner_sigma_px, if is_late { BESIDE_LATE } else { 1.0 })
+        .or_else(|| is_late.then(|| not_simultaneous(calibration.alone_px, misfit)))
 }
 
 /// How far pairs miss their common rig.
@@ -94,10 +101,13 @@ fn left_px(shared: &Shared, view: &View) -> f64 {
     misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px)
 }
 
-/// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares.
-fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
-    /// Most of it that may be left. One number of sixteen that a rig has takes up little of what has another cause.
-    const LEFT: f64 = 0.5;
+/// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares, and those move the corners by more
+/// than these scatter; `most` is the share of the misfit that may be left.
+fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64, most: f64) -> Option<Finding> {
+    // What corners scatter by leaves nothing to explain.
+    if misfit.usual_px < std::f64::consts::SQRT_2 * corner_sigma_px {
+        return None;
+    }
     // With at least the terms that nearly all lenses need: misfit that the board made may have left fewer.
     let [left, right] = Side::BOTH.map(|side| calibration.layout.lens(side).map(|lens| lens.max(Lens::Brown5)));
     let layout = Layout { left, right, ..calibration.layout };
@@ -111,7 +121,8 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
     let before_px = median_px(&problem)?.min(misfit.usual_px);
     let (stretch, fitted) = likeliest_stretch(&problem, &layout)?;
     let left_px = median_px(&fitted)?;
-    if left_px > LEFT * before_px {
+    let of_board_px = (before_px.powi(2) - left_px.powi(2)).max(0.0).sqrt();
+    if left_px > most * before_px || of_board_px < corner_sigma_px {
         return None;
     }
     let [width_mm, height_mm] = calibration.board.sides_mm();
@@ -137,8 +148,14 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit) -> Option<Finding> {
 /// By how much wider the board is than was said, for its height, and the pairs with that board. `None` where the pairs do not tell, or where it
 /// explains too little of what they miss the rig by to be the cause. Method: Gauss-Newton with the rig and the poses eliminated.
 fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<(f64, Problem)> {
-    /// Share of chi-squared that a cause takes away at least; the misfit falls to half of it, and chi-squared to a quarter.
+    /// Share of chi-squared that a cause takes away at least.
     const LEAST: f64 = 0.25;
+    // What pairs miss a rig by is six numbers of each, of which the rig takes up its own.
+    let freedom = (6 * problem.views.len()) as f64 - layout.count() as f64;
+    let is_chance = |share: f64| {
+        let law = FisherSnedecor::new(1.0, freedom);
+        law.map_or(true, |law| law.sf(freedom * share / (1.0 - share).max(f64::EPSILON)) > CHANCE)
+    };
     let (mut stretch, mut fitted) = (0.0, problem.clone());
     for round in 0..MOST_ROUNDS {
         let at = |by: f64| {
@@ -148,7 +165,8 @@ fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<(f64, Problem
         let [below, here, above] = [at(-SMALL)?, at(0.0)?, at(SMALL)?];
         let (slope, curvature) = (0.5 * (above - below), above - 2.0 * here + below);
         let change = -slope / curvature * SMALL;
-        let enough = round > 0 || 0.5 * slope * slope / curvature > LEAST * here;
+        let share = 0.5 * slope * slope / curvature / here;
+        let enough = round > 0 || share > LEAST && !is_chance(share);
         stretch = (1.0 + stretch) * (1.0 + change) - 1.0;
         if !(curvature > 0.0 && enough && f64::abs(stretch) < MOST_STRETCH) {
             return None;
