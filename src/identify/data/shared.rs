@@ -138,7 +138,7 @@ fn split(shared: &Shared, set: &Dataset) -> Option<Parts> {
 }
 
 /// A matrix R with R R' the covariance.
-fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
+pub fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
     let eigen = SymmetricEigen::new(covariance);
     let mut root = eigen.eigenvectors;
     for (mut column, value) in root.column_iter_mut().zip(eigen.eigenvalues.iter()) {

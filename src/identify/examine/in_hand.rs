@@ -18,10 +18,7 @@ const FEWEST: usize = 8;
 
 /// Refuses points of cameras on the hand.
 pub fn refuse(set: &Dataset, robot: &Robot) -> Result<(), Error> {
-    let of_group = |group: usize| set.rows(|pose| pose.group == group && pose.on_body_mm.is_none());
-    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
-    let point = |row: &usize| Some((set.poses[*row].joints_rad.clone(), set.poses[*row].reading.point_mm()?));
-    let (joints, points): (Vec<Vec<f64>>, Vec<Point3<f64>>) = rows.iter().filter_map(point).unzip();
+    let (joints, points) = most_points(set);
     let fits = (robot.fit_tool(&joints, &points, Start::Around), robot.fit_backwards(&joints, &points));
     match fits {
         (Some(as_is), Some(backwards)) if points.len() >= FEWEST && backwards.left_mm * EXPLAINS < as_is.left_mm => {
@@ -31,9 +28,17 @@ pub fn refuse(set: &Dataset, robot: &Robot) -> Result<(), Error> {
     }
 }
 
+/// Joints, rad, and points of the placement with most rows, but for those that stand on a body.
+pub fn most_points(set: &Dataset) -> (Vec<Vec<f64>>, Vec<Point3<f64>>) {
+    let of_group = |group: usize| set.rows(|pose| pose.group == group && pose.on_body_mm.is_none());
+    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
+    let point = |row: &usize| Some((set.poses[*row].joints_rad.clone(), set.poses[*row].reading.point_mm()?));
+    rows.iter().filter_map(point).unzip()
+}
+
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Point3, Vector3};
+    use nalgebra::Vector3;
 
     use super::*;
     use crate::geometry::transform;

@@ -25,6 +25,7 @@ use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
 use crate::identify::finding::Finding;
 use crate::identify::judge::recheck::zero;
+use crate::identify::residuals::distances::Origin;
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::settings::Settings;
 use crate::identify::solve::linearised::{Fresh, Placement};
@@ -196,14 +197,16 @@ impl<'a> Search<'a> {
             };
             let zeros = || zeros.iter().map(|&k| fresh(linear.jacobian.columns(k, 1).into_owned())).collect();
             match block {
-                Block::Wire(_) => placed.push(place(of_rows, linear.design.clone(), None, false)),
                 Block::Points(_) => {
                     placed.push(Placed { zeros: zeros(), ..place(of_rows, linear.design.clone(), None, true) });
                 }
-                Block::Center(c) => {
-                    let center = Some(rows.rows[c.center]);
-                    placed.push(place(of_rows, c.of_center(&problem.places, &rows.scatter), center, true));
-                }
+                Block::Distances(distances) => placed.push(match distances.from {
+                    Origin::Anchor(..) => place(of_rows, linear.design.clone(), None, false),
+                    Origin::Center(center) => {
+                        let columns = distances.of_origin(&problem.places, &rows.scatter);
+                        place(of_rows, columns, Some(rows.rows[center]), true)
+                    }
+                }),
                 // Each socket by itself: it touches few of the rows.
                 Block::Touch(touch) => {
                     for socket in 0..touch.sockets.len() {

@@ -9,9 +9,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::residuals::eliminate::{Block, Unknowns};
-use crate::identify::residuals::rows::{RowSpec, Rows};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Extra, Scatter};
-use crate::identify::settings::Model;
+use crate::identify::settings::{Model, Settings};
+use crate::identify::solve::task::Task;
 use crate::robot::Robot;
 
 /// Fewest rows that a group without fitted rows is placed by.
@@ -119,19 +120,9 @@ impl<'a> Judge<'a> {
         // How a body is turned on this robot's flange its rows say anew.
         let of_sensor = |(extra, _): &(Extra, f64)| !matches!(extra, Extra::Target(_));
         let (extras, values): (Vec<Extra>, Vec<f64>) = self.extras.iter().copied().filter(of_sensor).unzip();
-        let rows = Rows::new(&RowSpec {
-            set: self.set,
-            robot,
-            load_chain: robot,
-            parameters: &[],
-            extras: &extras,
-            rows,
-            weights: &[],
-            model,
-            scatter: self.scatter,
-            wire_offset: self.wire_offset,
-        });
-        (rows, values)
+        let settings = Settings { wire_offset: self.wire_offset, ..Settings::default() };
+        let task = Task { extras: &extras, model, ..Task::plain(self.set, robot, &[], rows, &settings) };
+        (task.rows_at(self.scatter, robot), values)
     }
 
     /// A predicted and a measured point, the sensor's own errors taken off, and its covariance; `flange_from_body` is how a body of several

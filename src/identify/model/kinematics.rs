@@ -61,11 +61,6 @@ pub struct Place {
     pub rotation_columns: Matrix3xX<f64>,
 }
 
-/// Number of columns of these places.
-pub fn column_count(places: &[Place]) -> usize {
-    places.first().map_or(0, |place| place.point_columns.ncols())
-}
-
 impl Kinematics {
     /// `joints_rad`: one vector of commanded angles a pose, of the robot's joint count.
     /// Weights have their levers on the chain of `load_chain`.

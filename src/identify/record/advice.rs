@@ -4,13 +4,13 @@ use nalgebra::Point3;
 
 use super::file::Record;
 use super::findings::{self, Findings};
-use super::gather;
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
 use super::rounded;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::still::constant_joints;
 use crate::identify::data::unused;
+use crate::identify::examine::in_hand::most_points;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
 use crate::identify::run::{Against, Identification};
@@ -124,7 +124,7 @@ impl Record {
 
     /// What is left of the nominal robot once its tool is solved, mm in the middle of the rows.
     fn with_tool_mm(&self, set: &Dataset, nominal: &Robot) -> Option<f64> {
-        let (joints, points) = gather::most_points(set);
+        let (joints, points) = most_points(set);
         self.tool_mm.map(|(_, left)| left).or_else(|| nominal.left_mm(&joints, &points))
     }
 

@@ -1,13 +1,12 @@
 //! Gathers what stands in `identification.json`.
 
-use nalgebra::Point3;
-
 use super::file::{Record, Smooth};
 use super::findings::Findings;
 use super::parameters::{self, Identifiability, MethodRecord};
 use super::quality::quality;
 use super::touched::Touched;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::in_hand::most_points;
 use crate::identify::examine::sessions::Along;
 use crate::identify::judge::recheck::variances_along;
 use crate::identify::judge::uncertainty::{Covariance, Expected};
@@ -99,12 +98,4 @@ fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     let (joints, points) = most_points(set);
     let (before, after) = (nominal.left_mm(&joints, &points)?, nominal.fit_tool(&joints, &points, Start::Around)?);
     (after.left_mm * FAR_NEARER < before).then(|| (after.tool_mm.into(), after.left_mm))
-}
-
-/// Joints, rad, and points of the placement with most rows, but for those that stand on a body.
-pub(super) fn most_points(set: &Dataset) -> (Vec<Vec<f64>>, Vec<Point3<f64>>) {
-    let of_group = |g: usize| set.rows(|p| p.group == g && p.on_body_mm.is_none());
-    let rows = (0..set.groups.len()).map(of_group).max_by_key(Vec::len).unwrap_or_default();
-    let point = |&r: &usize| Some((set.poses[r].joints_rad.clone(), set.poses[r].reading.point_mm()?));
-    rows.iter().filter_map(point).unzip()
 }

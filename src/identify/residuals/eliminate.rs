@@ -7,13 +7,14 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::distances::{Center, Wire};
+use super::distances::Distances;
 use super::pairwise::Pairs;
 use super::points::Points;
+use super::state::State;
 use super::touch::Touch;
 use crate::geometry::Transform;
-use crate::identify::model::kinematics::{Place, column_count};
-use crate::identify::sensor::{Raw, Scatter};
+use crate::identify::model::kinematics::Place;
+use crate::identify::sensor::Raw;
 use crate::linear_algebra::{pseudo_inverse, without};
 
 /// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
@@ -25,10 +26,8 @@ const INNER_GAIN: f64 = 1e-14;
 /// What one block measures.
 #[derive(Debug, Clone)]
 pub enum Block {
-    /// Distances to the group's centre: eq. (7) to (10), the centre computed anew with the same parameters.
-    Center(Center),
-    /// Distances to a fixed point that is unknown.
-    Wire(Wire),
+    /// Distances to the group's centre: eq. (7) to (10), the centre computed anew with the same parameters; or to a fixed point that is unknown.
+    Distances(Distances),
     /// Touches of fixed points that are unknown, some of them at known distances.
     Touch(Touch),
     /// Points, with a free rigid transform; orientations too where they are used.
@@ -41,7 +40,7 @@ pub enum Block {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Unknowns {
     Nothing,
-    /// The wire's fixed point, base frame, and its reading at length zero, mm.
+    /// The point of distances, base frame, and a wire's reading at length zero, mm.
     Anchor(Vector3<f64>, f64),
     /// Touched points, base frame, mm.
     Sockets(Vec<Vector3<f64>>),
@@ -64,8 +63,8 @@ impl Block {
     /// Number of unknowns of its own.
     pub fn unknown_count(&self) -> usize {
         match self {
-            Block::Center(_) | Block::Pairwise(_) => 0,
-            Block::Wire(wire) => wire.unknown_count(),
+            Block::Distances(distances) => distances.unknown_count(),
+            Block::Pairwise(_) => 0,
             Block::Touch(touch) => 3 * touch.sockets.len(),
             Block::Points(_) => 6,
         }
@@ -73,7 +72,7 @@ impl Block {
 
     pub fn row_count(&self) -> usize {
         match self {
-            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => lengths.len(),
+            Block::Distances(distances) => distances.lengths.len(),
             Block::Touch(touch) => touch.row_count(),
             Block::Points(points) => points.rows_a_spot() * points.spots.len(),
             Block::Pairwise(pairs) => pairs.row_count(),
@@ -84,9 +83,7 @@ impl Block {
     pub fn count(&self) -> usize {
         let counted = |weights: &mut dyn Iterator<Item = f64>| weights.filter(|w| *w > 0.0).count();
         let numbers = match self {
-            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
-                counted(&mut lengths.iter().map(|l| l.weight))
-            }
+            Block::Distances(distances) => counted(&mut distances.lengths.iter().map(|l| l.weight)),
             Block::Touch(touch) => 3 * counted(&mut touch.contacts.iter().map(|c| c.weight)) + touch.known.len(),
             Block::Points(points) => points.count(),
             Block::Pairwise(pairs) => pairs.count(),
@@ -97,9 +94,7 @@ impl Block {
     /// Index among the places of the pose that each residual belongs to; `None` for what belongs to no pose.
     pub fn row_poses(&self) -> Vec<Option<usize>> {
         match self {
-            Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
-                lengths.iter().map(|l| Some(l.pose)).collect()
-            }
+            Block::Distances(distances) => distances.lengths.iter().map(|l| Some(l.pose)).collect(),
             Block::Touch(touch) => touch.row_poses(),
             Block::Points(points) => {
                 let rows = points.rows_a_spot();
@@ -111,48 +106,39 @@ impl Block {
 
     fn start(&self, places: &[Place]) -> Unknowns {
         match self {
-            Block::Center(_) | Block::Pairwise(_) => Unknowns::Nothing,
-            Block::Wire(wire) => Unknowns::Anchor(wire.anchor_mm, 0.0),
+            Block::Distances(distances) => Unknowns::Anchor(distances.start(places), 0.0),
+            Block::Pairwise(_) => Unknowns::Nothing,
             Block::Touch(touch) => Unknowns::Sockets(touch.sockets.clone()),
             Block::Points(points) => Unknowns::Frame(points.start(places)),
         }
     }
 
     /// White residuals and their derivatives with respect to the block's own unknowns.
-    fn inner(
-        &self,
-        places: &[Place],
-        extras: &[f64],
-        scatter: &Scatter,
-        at: &Unknowns,
-    ) -> (DVector<f64>, DMatrix<f64>) {
+    fn inner(&self, state: &State, at: &Unknowns) -> (DVector<f64>, DMatrix<f64>) {
         match (self, at) {
-            (Block::Center(center), _) => center.inner(places, extras, scatter),
-            (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.inner(places, extras, scatter, point, *zero),
-            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.inner(places, scatter, sockets),
-            (Block::Points(points), Unknowns::Frame(frame)) => points.inner(places, extras, scatter, frame),
-            (Block::Pairwise(pairs), _) => (pairs.residuals(places), DMatrix::zeros(pairs.row_count(), 0)),
+            (Block::Distances(distances), Unknowns::Anchor(point, zero)) => distances.inner(state, point, *zero),
+            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.inner(state, sockets),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.inner(state, frame),
+            (Block::Pairwise(pairs), _) => (pairs.residuals(&state.places), DMatrix::zeros(pairs.row_count(), 0)),
             _ => (DVector::zeros(0), DMatrix::zeros(0, 0)),
         }
     }
 
     /// White derivatives with respect to the robot's parameters and the extra unknowns, the block's own held.
-    fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, at: &Unknowns) -> DMatrix<f64> {
-        let columns = column_count(places) + extras.len();
+    fn outer(&self, state: &State, at: &Unknowns) -> DMatrix<f64> {
         match (self, at) {
-            (Block::Center(center), _) => center.outer(places, extras.len(), scatter),
-            (Block::Wire(wire), Unknowns::Anchor(point, _)) => wire.outer(places, extras.len(), scatter, point),
-            (Block::Touch(touch), _) => touch.outer(places, extras.len(), scatter),
-            (Block::Points(points), Unknowns::Frame(frame)) => points.outer(places, extras, scatter, frame),
-            (Block::Pairwise(pairs), _) => pairs.derivatives(places).resize_horizontally(columns, 0.0),
-            _ => DMatrix::zeros(0, columns),
+            (Block::Distances(distances), Unknowns::Anchor(point, _)) => distances.outer(state, point),
+            (Block::Touch(touch), _) => touch.outer(state),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.outer(state, frame),
+            (Block::Pairwise(pairs), _) => pairs.derivatives(state).resize_horizontally(state.columns(), 0.0),
+            _ => DMatrix::zeros(0, state.columns()),
         }
     }
 
     /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
-    pub fn solve(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
-        let mut at = self.start(places);
-        let (mut residuals, mut design) = self.inner(places, extras, scatter, &at);
+    pub fn solve(&self, state: &State) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
+        let mut at = self.start(&state.places);
+        let (mut residuals, mut design) = self.inner(state, &at);
         if self.unknown_count() == 0 {
             return (at, residuals, design);
         }
@@ -167,7 +153,7 @@ impl Block {
             // Halved until the cost falls; where it does not, the place is as good as it gets.
             let moved = (0..8).find_map(|halvings| {
                 let trial = at.moved(&(0.5f64.powi(halvings) * &step));
-                let (r, d) = self.inner(places, extras, scatter, &trial);
+                let (r, d) = self.inner(state, &trial);
                 (r.norm_squared() <= cost).then_some((trial, r, d))
             });
             let Some(moved) = moved else { break };
@@ -178,38 +164,29 @@ impl Block {
 
     /// White residuals with the placement's unknowns at their best, and (where the places have columns and `derivatives`) the Jacobian with these
     /// eliminated.
-    pub fn evaluate(
-        &self,
-        places: &[Place],
-        extras: &[f64],
-        scatter: &Scatter,
-        derivatives: bool,
-    ) -> (DVector<f64>, DMatrix<f64>) {
-        let (unknowns, residuals, design) = self.solve(places, extras, scatter);
-        let mut jacobian = DMatrix::zeros(residuals.len(), 0);
-        if derivatives {
-            jacobian = self.outer(places, extras, scatter, &unknowns);
-            if self.unknown_count() > 0 {
-                jacobian = without(&jacobian, &design);
-            }
+    pub fn evaluate(&self, state: &State, derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
+        if !derivatives {
+            let (_, residuals, _) = self.solve(state);
+            let rows = residuals.len();
+            return (residuals, DMatrix::zeros(rows, 0));
         }
-        (residuals, jacobian)
+        let Linear { residuals, jacobian, design } = self.linear(state);
+        (residuals, if self.unknown_count() > 0 { without(&jacobian, &design) } else { jacobian })
     }
 
     /// Residuals and all derivatives with the unknowns at their best, nothing eliminated.
-    pub fn linear(&self, places: &[Place], extras: &[f64], scatter: &Scatter) -> Linear {
-        let (unknowns, residuals, design) = self.solve(places, extras, scatter);
-        Linear { residuals, jacobian: self.outer(places, extras, scatter, &unknowns), design }
+    pub fn linear(&self, state: &State) -> Linear {
+        let (unknowns, residuals, design) = self.solve(state);
+        Linear { residuals, jacobian: self.outer(state, &unknowns), design }
     }
 
     /// Residuals before whitening, for the estimate of the scatter and for lists of what fits badly; by pose, with the row's weight.
-    pub fn raw(&self, places: &[Place], extras: &[f64], at: &Unknowns) -> Vec<(usize, f64, Raw)> {
-        match (self, at) {
-            (Block::Center(center), _) => center.raw(places, extras),
-            (Block::Wire(wire), Unknowns::Anchor(point, zero)) => wire.raw(places, extras, point, *zero),
-            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.raw(places, sockets),
-            (Block::Points(points), Unknowns::Frame(frame)) => points.raw(places, extras, frame),
-            (Block::Pairwise(pairs), _) => pairs.raw(places),
+    pub fn raw(&self, state: &State) -> Vec<(usize, f64, Raw)> {
+        match (self, &self.solve(state).0) {
+            (Block::Distances(distances), Unknowns::Anchor(point, zero)) => distances.raw(state, point, *zero),
+            (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.raw(state, sockets),
+            (Block::Points(points), Unknowns::Frame(frame)) => points.raw(state, frame),
+            (Block::Pairwise(pairs), _) => pairs.raw(&state.places),
             _ => Vec::new(),
         }
     }

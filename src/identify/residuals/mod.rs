@@ -7,4 +7,5 @@ pub mod points;
 pub mod rows;
 pub mod smooth;
 pub mod starts;
+pub mod state;
 pub mod touch;

@@ -8,8 +8,9 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Matrix3xX, Vector3};
 
+use super::state::State;
 use crate::geometry::direction;
-use crate::identify::model::kinematics::{Place, column_count};
+use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::{Raw, Scatter, Spot};
 
 /// Poses whose distances are taken together at the most.
@@ -88,9 +89,8 @@ impl Pairs {
     }
 
     /// Derivatives of [`Pairs::residuals`].
-    pub fn derivatives(&self, places: &[Place]) -> DMatrix<f64> {
-        let columns = column_count(places);
-        let n = self.spots.len();
+    pub fn derivatives(&self, state: &State) -> DMatrix<f64> {
+        let (places, columns, n) = (&state.places, state.of_robot(), self.spots.len());
         let mut sums = vec![Matrix3xX::zeros(columns); n];
         let mut row = nalgebra::RowDVector::zeros(columns);
         for (k, a, b) in self.pairs() {

@@ -3,11 +3,12 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::smooth::Field;
+use super::state::State;
 use crate::geometry::{
     Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
 };
-use crate::identify::model::kinematics::{Place, column_count};
-use crate::identify::sensor::{Extra, Raw, Scatter, Spot};
+use crate::identify::model::kinematics::Place;
+use crate::identify::sensor::{Extra, Raw, Spot};
 use crate::robot::jacobian::RAD_PER_MRAD;
 
 /// Points are on a line where they are scattered square to it by less than this share of what they are along it.
@@ -81,42 +82,35 @@ impl Points {
         spot.on_body_mm.map(|part| place.rotation * (flange_from_target * part))
     }
 
-    fn point_residual(
-        place: &Place,
-        extras: &[f64],
-        frame: &Transform,
-        flange_from_target: &Matrix3<f64>,
-        spot: &Spot,
-    ) -> Vector3<f64> {
-        let part = Points::on_body(place, flange_from_target, spot).unwrap_or_else(Vector3::zeros);
-        let mut residual = frame * (place.point_mm + part) - spot.point_mm;
-        for (column, e) in spot.extra.column_iter().zip(extras) {
-            residual += column * *e;
-        }
-        residual
+    /// What each spot is off by, mm.
+    fn residuals(&self, state: &State, frame: &Transform) -> Vec<Vector3<f64>> {
+        let flange_from_target = self.turned_target(state.extras);
+        let residual = |spot: &Spot| {
+            let place = &state.places[spot.pose];
+            let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
+            let mut residual = frame * (place.point_mm + part) - spot.point_mm;
+            for (column, e) in spot.extra.column_iter().zip(state.extras) {
+                residual += column * *e;
+            }
+            residual
+        };
+        self.spots.iter().map(residual).collect()
     }
 
-    pub(super) fn inner(
-        &self,
-        places: &[Place],
-        extras: &[f64],
-        scatter: &Scatter,
-        frame: &Transform,
-    ) -> (DVector<f64>, DMatrix<f64>) {
+    pub(super) fn inner(&self, state: &State, frame: &Transform) -> (DVector<f64>, DMatrix<f64>) {
         let rows = self.rows_a_spot();
-        let flange_from_target = self.turned_target(extras);
+        let flange_from_target = self.turned_target(state.extras);
         let mut residuals = DVector::zeros(rows * self.spots.len());
         let mut design = DMatrix::zeros(rows * self.spots.len(), 6);
-        for (i, spot) in self.spots.iter().enumerate() {
-            let (place, row) = (&places[spot.pose], rows * i);
+        for (i, (spot, residual)) in self.spots.iter().zip(self.residuals(state, frame)).enumerate() {
+            let (place, row) = (&state.places[spot.pose], rows * i);
             let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
             let turned = frame.rotation * (place.point_mm.coords + part);
             let whiten = spot.whitener;
-            let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot);
             residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
             design.fixed_view_mut::<3, 6>(row, 0).copy_from(&(whiten * rigid_columns(&turned)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
-                let weight = spot.weight / scatter.rotation_rad;
+                let weight = spot.weight / state.scatter.rotation_rad;
                 let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);
                 residuals.fixed_rows_mut::<3>(row + 3).copy_from(&(weight * turn));
                 design.fixed_view_mut::<3, 3>(row + 3, 0).copy_from(&(weight * Matrix3::identity()));
@@ -133,13 +127,12 @@ impl Points {
         (residuals, design)
     }
 
-    pub(super) fn outer(&self, places: &[Place], extras: &[f64], scatter: &Scatter, frame: &Transform) -> DMatrix<f64> {
-        let rows = self.rows_a_spot();
-        let robot = column_count(places);
-        let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(extras));
-        let mut jacobian = DMatrix::zeros(rows * self.spots.len(), robot + extras.len());
+    pub(super) fn outer(&self, state: &State, frame: &Transform) -> DMatrix<f64> {
+        let (rows, robot) = (self.rows_a_spot(), state.of_robot());
+        let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(state.extras));
+        let mut jacobian = DMatrix::zeros(rows * self.spots.len(), state.columns());
         for (i, spot) in self.spots.iter().enumerate() {
-            let (place, row) = (&places[spot.pose], rows * i);
+            let (place, row) = (&state.places[spot.pose], rows * i);
             let whiten = spot.whitener;
             jacobian.view_mut((row, 0), (3, robot)).copy_from(&(whiten * rotation * &place.point_columns));
             for (k, column) in spot.extra.column_iter().enumerate() {
@@ -155,7 +148,7 @@ impl Points {
                 }
             }
             if self.oriented && spot.rotation.is_some() {
-                let weight = spot.weight / scatter.rotation_rad;
+                let weight = spot.weight / state.scatter.rotation_rad;
                 let turn = rotation * weight;
                 jacobian.view_mut((row + 3, 0), (3, robot)).copy_from(&(turn * &place.rotation_columns));
                 let sensor_from_flange = turn * place.rotation * RAD_PER_MRAD;
@@ -171,26 +164,22 @@ impl Points {
     }
 
     /// The smooth error at the spots, mm, as far as it is known.
-    pub(super) fn smooth_mm(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<Vector3<f64>> {
-        let flange_from_target = self.turned_target(extras);
-        let residual =
-            |spot: &Spot| Points::point_residual(&places[spot.pose], extras, frame, &flange_from_target, spot);
+    pub(super) fn smooth_mm(&self, state: &State, frame: &Transform) -> Vec<Vector3<f64>> {
         match &self.field {
-            Some(field) => field.most_probable(&self.spots.iter().map(residual).collect::<Vec<_>>()),
+            Some(field) => field.most_probable(&self.residuals(state, frame)),
             None => vec![Vector3::zeros(); self.spots.len()],
         }
     }
 
-    pub(super) fn raw(&self, places: &[Place], extras: &[f64], frame: &Transform) -> Vec<(usize, f64, Raw)> {
-        let flange_from_target = self.turned_target(extras);
+    pub(super) fn raw(&self, state: &State, frame: &Transform) -> Vec<(usize, f64, Raw)> {
+        let flange_from_target = self.turned_target(state.extras);
         let mut list = Vec::new();
-        let smooth = self.smooth_mm(places, extras, frame);
-        for (spot, smooth) in self.spots.iter().zip(smooth) {
-            let place = &places[spot.pose];
-            let residual = Points::point_residual(place, extras, frame, &flange_from_target, spot) - smooth;
-            list.push((spot.pose, spot.weight, Raw::Point(residual, spot.covariance_mm2)));
+        let left = self.residuals(state, frame).into_iter().zip(self.smooth_mm(state, frame));
+        for (spot, (residual, smooth)) in self.spots.iter().zip(left) {
+            list.push((spot.pose, spot.weight, Raw::Point(residual - smooth, spot.covariance_mm2)));
             if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
-                let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);
+                let sensor_from_flange = rotation_matrix(frame) * state.places[spot.pose].rotation;
+                let turn = turn(&sensor_from_flange, &flange_from_target, measured);
                 list.push((spot.pose, spot.weight, Raw::Turn(turn)));
             }
         }

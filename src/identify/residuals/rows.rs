@@ -7,12 +7,13 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector};
 
-use super::distances::{Center, Wire};
+use super::distances::{Distances, Origin};
 use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
 use super::starts::{first_anchor, frames_and_turn};
+use super::state::State;
 use super::touch::{Contact, Touch};
 use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
@@ -90,12 +91,17 @@ impl Rows {
         offsets.split_at(self.kinematics.parameters.len())
     }
 
+    /// What residuals at these offsets are taken at.
+    pub fn state<'a>(&'a self, offsets: &'a [f64], derivatives: bool) -> State<'a> {
+        let (of_robot, extras) = self.split(offsets);
+        State { places: self.kinematics.places(of_robot, derivatives), extras, scatter: &self.scatter }
+    }
+
     /// White residuals and derivatives with respect to all offsets.
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
-        let (of_robot, extras) = self.split(offsets);
-        let places = self.kinematics.places(of_robot, derivatives);
+        let state = self.state(offsets, derivatives);
         let parts: Vec<(DVector<f64>, DMatrix<f64>)> =
-            self.blocks.iter().map(|b| b.evaluate(&places, extras, &self.scatter, derivatives)).collect();
+            self.blocks.iter().map(|b| b.evaluate(&state, derivatives)).collect();
         let rows = parts.iter().map(|(residuals, _)| residuals.len()).sum();
         let columns = if derivatives { offsets.len() } else { 0 };
         let (mut residuals, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
@@ -110,17 +116,14 @@ impl Rows {
 
     /// Residuals before whitening, by row of the data set, with the root of the row's weight.
     pub fn raw(&self, offsets: &[f64]) -> Vec<(usize, f64, Raw)> {
-        let (of_robot, extras) = self.split(offsets);
-        let places = self.kinematics.places(of_robot, false);
-        let of_block = |b: &Block| b.raw(&places, extras, &b.solve(&places, extras, &self.scatter).0);
-        self.blocks.iter().flat_map(of_block).map(|(place, w, raw)| (self.rows[place], w, raw)).collect()
+        let state = self.state(offsets, false);
+        self.blocks.iter().flat_map(|b| b.raw(&state)).map(|(place, w, raw)| (self.rows[place], w, raw)).collect()
     }
 
     /// The unknowns of every placement at these offsets.
     pub fn unknowns(&self, offsets: &[f64]) -> Vec<Unknowns> {
-        let (of_robot, extras) = self.split(offsets);
-        let places = self.kinematics.places(of_robot, false);
-        self.blocks.iter().map(|b| b.solve(&places, extras, &self.scatter).0).collect()
+        let state = self.state(offsets, false);
+        self.blocks.iter().map(|b| b.solve(&state).0).collect()
     }
 
     /// The variance that stands for one, mm^2: costs are multiplied by it.
@@ -129,8 +132,7 @@ impl Rows {
         let scatter = &self.scatter;
         for block in &self.blocks {
             match block {
-                Block::Center(c) => precision.extend(c.lengths.iter().map(|l| scatter.sd(l, 2.0).powi(-2))),
-                Block::Wire(w) => precision.extend(w.lengths.iter().map(|l| scatter.sd(l, 1.0).powi(-2))),
+                Block::Distances(d) => precision.extend(d.lengths.iter().map(|l| scatter.sd(l, d.times()).powi(-2))),
                 Block::Points(p) => {
                     precision.extend(p.spots.iter().map(|s| 3.0 / scatter.total(&s.covariance_mm2).trace()));
                 }
@@ -164,29 +166,26 @@ impl Rows {
     /// The same rows with the sensor's errors, the extra unknowns and what is smooth, fixed as they are at these offsets and taken off the
     /// readings.
     pub fn with_sensor_fixed(&self, offsets: &[f64]) -> Rows {
-        let (of_robot, extras) = self.split(offsets);
-        let places = self.kinematics.places(of_robot, false);
+        let state = self.state(offsets, false);
         let unknowns = self.unknowns(offsets);
         let mut fixed = self.clone();
         fixed.scatter.smooth = None;
         let off = |length: &mut Length| {
-            length.length_mm -= length.gained(extras);
+            length.length_mm -= length.gained(state.extras);
             length.extra = RowDVector::zeros(0);
         };
         for (block, unknowns) in fixed.blocks.iter_mut().zip(&unknowns) {
             match block {
-                Block::Center(Center { lengths, .. }) | Block::Wire(Wire { lengths, .. }) => {
-                    lengths.iter_mut().for_each(off);
-                }
+                Block::Distances(distances) => distances.lengths.iter_mut().for_each(off),
                 Block::Points(p) => {
                     let Unknowns::Frame(frame) = unknowns else { continue };
-                    let smooth = p.smooth_mm(&places, extras, frame);
-                    (p.field, p.flange_from_target) = (None, p.turned_target(extras));
+                    let smooth = p.smooth_mm(&state, frame);
+                    (p.field, p.flange_from_target) = (None, p.turned_target(state.extras));
                     p.target.clear();
                     for (spot, error) in p.spots.iter_mut().zip(smooth) {
                         // Residuals are predicted less measured.
                         spot.point_mm += error;
-                        for (column, e) in spot.extra.column_iter().zip(extras) {
+                        for (column, e) in spot.extra.column_iter().zip(state.extras) {
                             spot.point_mm -= column * *e;
                         }
                         spot.extra = Matrix3xX::zeros(0);
@@ -253,13 +252,11 @@ impl Inputs<'_> {
         if lengths.is_empty() {
             return None;
         }
-        match self.spec.set.groups[group].center.map(|c| self.place_of(c)) {
-            Some(center) => Some(Block::Center(Center { center, lengths })),
-            None => {
-                let anchor_mm = first_anchor(self.places, &lengths);
-                Some(Block::Wire(Wire { lengths, anchor_mm, offset: self.spec.wire_offset }))
-            }
-        }
+        let from = match self.spec.set.groups[group].center.map(|c| self.place_of(c)) {
+            Some(center) => Origin::Center(center),
+            None => Origin::Anchor(first_anchor(self.places, &lengths), self.spec.wire_offset),
+        };
+        Some(Block::Distances(Distances { lengths, from }))
     }
 
     /// One block for all sockets that known distances tie together.
@@ -328,7 +325,8 @@ impl Inputs<'_> {
             Some(Length { pose: spot.pose, length_mm, variance_mm2, weight: spot.weight, extra })
         };
         let lengths: Vec<Length> = self.by_group[group].iter().filter_map(length).collect();
-        if lengths.is_empty() { None } else { Some(Block::Center(Center { center: center.pose, lengths })) }
+        let from = Origin::Center(center.pose);
+        (!lengths.is_empty()).then_some(Block::Distances(Distances { lengths, from }))
     }
 
     fn pairs(&self, group: usize) -> Vec<Block> {

@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use super::state::State;
 use crate::geometry::direction;
 use crate::identify::data::dataset::KnownDistance;
-use crate::identify::model::kinematics::{Place, column_count};
 use crate::identify::sensor::{Raw, Scatter};
 
 /// A pose at which a socket was touched.
@@ -47,17 +47,12 @@ impl Touch {
         contact.weight / variance.max(f64::MIN_POSITIVE).sqrt()
     }
 
-    pub(super) fn inner(
-        &self,
-        places: &[Place],
-        scatter: &Scatter,
-        sockets: &[Vector3<f64>],
-    ) -> (DVector<f64>, DMatrix<f64>) {
+    pub(super) fn inner(&self, state: &State, sockets: &[Vector3<f64>]) -> (DVector<f64>, DMatrix<f64>) {
         let mut residuals = DVector::zeros(self.row_count());
         let mut design = DMatrix::zeros(self.row_count(), 3 * sockets.len());
         for (i, contact) in self.contacts.iter().enumerate() {
-            let by = Touch::by(contact, scatter);
-            let residual = places[contact.pose].point_mm.coords - sockets[contact.socket];
+            let by = Touch::by(contact, state.scatter);
+            let residual = state.places[contact.pose].point_mm.coords - sockets[contact.socket];
             residuals.fixed_rows_mut::<3>(3 * i).copy_from(&(residual * by));
             design.fixed_view_mut::<3, 3>(3 * i, 3 * contact.socket).copy_from(&(-by * Matrix3::identity()));
         }
@@ -71,19 +66,19 @@ impl Touch {
         (residuals, design)
     }
 
-    pub(super) fn outer(&self, places: &[Place], extras: usize, scatter: &Scatter) -> DMatrix<f64> {
-        let robot = column_count(places);
-        let mut jacobian = DMatrix::zeros(self.row_count(), robot + extras);
+    pub(super) fn outer(&self, state: &State) -> DMatrix<f64> {
+        let robot = state.of_robot();
+        let mut jacobian = DMatrix::zeros(self.row_count(), state.columns());
         for (i, contact) in self.contacts.iter().enumerate() {
-            let by = Touch::by(contact, scatter);
-            jacobian.view_mut((3 * i, 0), (3, robot)).copy_from(&(&places[contact.pose].point_columns * by));
+            let columns = &state.places[contact.pose].point_columns * Touch::by(contact, state.scatter);
+            jacobian.view_mut((3 * i, 0), (3, robot)).copy_from(&columns);
         }
         jacobian
     }
 
-    pub(super) fn raw(&self, places: &[Place], sockets: &[Vector3<f64>]) -> Vec<(usize, f64, Raw)> {
+    pub(super) fn raw(&self, state: &State, sockets: &[Vector3<f64>]) -> Vec<(usize, f64, Raw)> {
         let raw = |c: &Contact| {
-            let residual = places[c.pose].point_mm.coords - sockets[c.socket];
+            let residual = state.places[c.pose].point_mm.coords - sockets[c.socket];
             (c.pose, c.weight, Raw::Point(residual, Matrix3::identity() * c.variance_mm2))
         };
         self.contacts.iter().map(raw).collect()

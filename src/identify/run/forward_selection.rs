@@ -77,11 +77,9 @@ impl Session<'_> {
         let all = Terms::ALL.parameters(self.robot);
         let reference = self.reference(MOST_PARAMETERS);
         let mut at = Terms { chain: Chain::Mdh, ..reference };
-        let parameters = at.parameters(self.robot);
-        let formulation = Formulation::new(&self.task(&parameters, model))?;
-        let scatter = formulation.rows.scatter;
-        let validations = self.validations(&all, &parameters, &formulation, scatter, model);
-        let mut validations = self.take_warps(validations, &all, &parameters, scatter, model)?;
+        let formulation = Formulation::new(&self.task(&at.parameters(self.robot), model))?;
+        let validations = self.validations(&all, &formulation, formulation.rows.scatter);
+        let mut validations = self.take_warps(validations, &all, &formulation)?;
         let mut judged = Vec::new();
         let mut best = Terms::NOMINAL;
         for _ in 0..MOST_CLIMBS {
@@ -97,9 +95,8 @@ impl Session<'_> {
                 break;
             }
             at = best;
-            let parameters = at.parameters(self.robot);
-            let formulation = Formulation::new(&self.task(&parameters, model))?;
-            validations = self.validations(&all, &parameters, &formulation, formulation.rows.scatter, model);
+            let formulation = Formulation::new(&self.task(&at.parameters(self.robot), model))?;
+            validations = self.validations(&all, &formulation, formulation.rows.scatter);
         }
         Ok((best, judged))
     }
@@ -166,15 +163,8 @@ impl Session<'_> {
 
     /// CrossValidation linearised where a formulation ended, at a scatter that need not be its own: regions or whole placements, and where it is regions
     /// rows here and there as often as they are cut anew.
-    pub(super) fn validations(
-        &self,
-        all: &[Parameter],
-        reference: &[Parameter],
-        at: &Formulation,
-        scatter: Scatter,
-        model: Model,
-    ) -> Vec<CrossValidation> {
-        let (rows, linearised) = self.linearised(all, reference, at, scatter, model);
+    pub(super) fn validations(&self, all: &[Parameter], at: &Formulation, scatter: Scatter) -> Vec<CrossValidation> {
+        let (rows, linearised) = self.linearised(all, at, scatter);
         let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
         if regions.whole_placements {
             return vec![regions];
@@ -186,19 +176,12 @@ impl Session<'_> {
     }
 
     /// The rows of all these parameters at a scatter, linearised where a formulation of some of them ended.
-    pub(super) fn linearised(
-        &self,
-        all: &[Parameter],
-        reference: &[Parameter],
-        at: &Formulation,
-        scatter: Scatter,
-        model: Model,
-    ) -> (Rows, Linearised) {
-        let offsets = at.offsets_of();
+    pub(super) fn linearised(&self, all: &[Parameter], at: &Formulation, scatter: Scatter) -> (Rows, Linearised) {
+        let (offsets, reference) = (at.offsets_of(), at.parameters());
         let (of_robot, extras) = offsets.split_at(reference.len());
         let of_all = all.iter().map(|p| reference.iter().position(|q| q == p).map_or(0.0, |i| of_robot[i]));
         let wide: Vec<f64> = of_all.chain(extras.iter().copied()).collect();
-        let rows = self.task(all, model).rows_at(scatter, &self.robot.shifted(reference, of_robot));
+        let rows = self.task(all, at.model).rows_at(scatter, &self.robot.shifted(reference, of_robot));
         let linearised = Linearised::new(&rows, &wide);
         (rows, linearised)
     }
@@ -209,17 +192,15 @@ impl Session<'_> {
         &mut self,
         validations: Vec<CrossValidation>,
         all: &[Parameter],
-        reference: &[Parameter],
-        scatter: Scatter,
-        model: Model,
+        at: &Formulation,
     ) -> Result<Vec<CrossValidation>, Error> {
         if self.set.supposed_scale.is_none() {
             return Ok(validations);
         }
-        let kept = self.extras.len();
+        let (kept, reference) = (self.extras.len(), at.parameters());
         self.extras.extend((0..WARPS.len()).map(Extra::Warp));
-        let with = Formulation::new(&self.task(reference, model))?;
-        let richer = self.validations(all, reference, &with, scatter, model);
+        let with = Formulation::new(&self.task(reference, at.model))?;
+        let richer = self.validations(all, &with, at.rows.scatter);
         if richer[0].tolerance(reference).1 > validations[0].tolerance(reference).1 + EVIDENCE {
             return Ok(richer);
         }

@@ -10,8 +10,7 @@
 //!    of rows would let expect, nominal is kept. Without verify rows every row is fitted, and judged by fits that it was left out of.
 
 use super::forward_selection::Judged;
-use super::found::{Candidate, Deletion, Identification};
-use super::held_out::Against;
+use super::found::{Against, Candidate, Deletion, Identification};
 use super::session::{Gross, Session};
 use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
@@ -24,7 +23,7 @@ use crate::identify::settings::{Extensions, Method, Model, Settings};
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::problem::Problem;
 use crate::identify::solve::{swarm, trust_region};
-use crate::robot::{Parameter, Robot};
+use crate::robot::Robot;
 
 /// Numbers a parameter that a model needs to tell gross errors by: with fewer, a fit follows them.
 const ROWS_TELL: f64 = 2.0;
@@ -58,12 +57,11 @@ pub fn identify(
     let mut session = Session { set, robot, settings, seed, rows: set.fit_rows(), extras, smooth: None, step };
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     let (terms, judged, gross) = session.model(model, by_points)?;
-    let methods = settings.method.map_or(Method::ALL.to_vec(), |m| vec![m]);
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
     if matches!(model, Model::Position | Model::Pose) {
         session.smooth = session.smooth_error(by_points, &fitted_terms)?;
     }
-    let (mut candidates, deletions) = session.run_methods(model, fitted_terms, &methods)?;
+    let (mut candidates, deletions) = session.run_methods(model, fitted_terms)?;
     let held_out = |t: &Terms| judged.iter().find(|j| j.terms == t.name()).and_then(|j| j.held_out_mm);
     let nominal_held_out_mm = held_out(&Terms::NOMINAL);
     let chosen = best(&candidates);
@@ -202,36 +200,28 @@ impl Session<'_> {
     }
 
     /// All methods on one problem, and the fits without some of the rows where no row is there to verify.
-    fn run_methods(
-        &self,
-        model: Model,
-        terms: Terms,
-        methods: &[Method],
-    ) -> Result<(Vec<Candidate>, Vec<Deletion>), Error> {
+    fn run_methods(&self, model: Model, terms: Terms) -> Result<(Vec<Candidate>, Vec<Deletion>), Error> {
         let parameters = terms.parameters(self.robot);
         let mut formulation = Formulation::new(&self.task(&parameters, model))?;
         if model != Model::PairwiseDistance {
-            let validations = self.validations(&parameters, &parameters, &formulation, formulation.rows.scatter, model);
+            let validations = self.validations(&parameters, &formulation, formulation.rows.scatter);
             formulation.common = validations[0].common_factor(&parameters);
         }
-        let deletions = if self.set.verify_rows().is_empty() {
-            self.deletions(model, &parameters, &formulation)
-        } else {
-            Vec::new()
-        };
+        let deletions = if self.set.verify_rows().is_empty() { self.deletions(&formulation) } else { Vec::new() };
         let run = |method: &Method| {
             (self.step)(&format!("{} on {}", method.name(), model.name()));
             self.solved(&formulation, *method)
         };
-        let candidates = methods.iter().map(run).collect::<Result<Vec<Candidate>, Error>>()?;
-        Ok((candidates, deletions))
+        let methods = self.settings.method.map_or(Method::ALL.to_vec(), |method| vec![method]);
+        Ok((methods.iter().map(run).collect::<Result<_, Error>>()?, deletions))
     }
 
     /// What the fit becomes without each fold of the rows, each time that they are cut into folds.
-    fn deletions(&self, model: Model, parameters: &[Parameter], at: &Formulation) -> Vec<Deletion> {
+    fn deletions(&self, at: &Formulation) -> Vec<Deletion> {
         // What is smooth over a placement makes one of all its rows; without it rows can be left out.
         let scatter = Scatter { smooth: None, ..at.rows.scatter };
-        let (rows, linearised) = self.linearised(parameters, parameters, at, scatter, model);
+        let parameters = at.parameters();
+        let (rows, linearised) = self.linearised(parameters, at, scatter);
         let of_repeat = |of_row: &Vec<Option<usize>>| -> Vec<Deletion> {
             let changes = CrossValidation::by_folds(&linearised, &rows, of_row).deletions(parameters, &at.tolerance);
             let of_fold = |(fold, change): (usize, Option<Vec<f64>>)| {

@@ -41,14 +41,14 @@ pub struct Placement {
 impl Linearised {
     /// The rows at these offsets, the placements' own unknowns at their best.
     pub fn new(rows: &Rows, offsets: &[f64]) -> Linearised {
-        let (of_robot, extras) = rows.split(offsets);
-        let places = rows.kinematics.places(of_robot, true);
+        let state = rows.state(offsets, true);
         let of_block = |block: &Block| {
-            let linear = block.linear(&places, extras, &rows.scatter);
+            let linear = block.linear(&state);
             let at_zero = &linear.residuals - &linear.jacobian * DVector::from_column_slice(offsets);
             Placement { linear: Rc::new(linear), at_zero, poses: block.row_poses() }
         };
-        Linearised { placements: rows.blocks.iter().map(of_block).collect(), places, shared: offsets.len() }
+        let placements = rows.blocks.iter().map(of_block).collect();
+        Linearised { placements, places: state.places, shared: offsets.len() }
     }
 }
 

@@ -158,6 +158,14 @@ impl Points {
         })
     }
 
+    /// The same with these parameters beside those of the links.
+    pub(super) fn with_terms(&self, more: impl IntoIterator<Item = Parameter>) -> Points {
+        let mut parameters = self.parameters.clone();
+        let before_target = parameters.len() - TARGET;
+        parameters.splice(before_target..before_target, more);
+        Points { parameters, ..self.clone() }
+    }
+
     /// Weights without the rows that are gross errors for the robot of their own part.
     pub(super) fn without_gross(&self, parts: &[Vec<usize>]) -> Vec<f64> {
         let mut kept = vec![1.0; self.points_mm.len()];

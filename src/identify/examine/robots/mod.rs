@@ -9,9 +9,8 @@
 //! leave twice as much as well.
 //! Rows that are far off by themselves are errors of their own and no part of a state: they are left out first.
 //! Goes wrong: arms that differ by less than the model lacks; parts that alternate row by row; a sensor whose own errors changed between
-//! parts, which looks like another robot.
+//! parts, which looks like another robot; a change along the rows that a term follows, as where a joint only turned one way while it happened.
 
-mod beyond;
 mod fit;
 pub(super) mod loads;
 pub(super) mod tools;
@@ -24,6 +23,7 @@ use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::examine::hypothesis::still;
 use crate::identify::examine::{sessions, shifted};
 use crate::identify::finding::Finding;
+use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::sensor::REPEATABILITY_MM;
 use crate::identify::settings::{Extensions, Settings};
 use crate::robot::Robot;
@@ -311,6 +311,20 @@ impl Table {
         let each: Vec<Left> = parts.iter().map(alone).collect();
         let apart = each.iter().cloned().reduce(Left::and)?;
         Some(Compared { each, apart, together: self.points.together(parts, &weights) })
+    }
+
+    /// Whether one robot with any of the terms that `identify` may keep leaves less in these parts than what is much larger than several do.
+    pub(super) fn is_one_beyond_links(&self, parts: &[Vec<usize>], apart_mm: f64) -> bool {
+        let robot = &self.points.robot;
+        let links = Terms { chain: Chain::Mdh, ..Terms::NOMINAL };
+        let weights = self.points.without_gross(parts);
+        // From where the links end: far from there a term that hardly differs from a link's runs away.
+        let (_, near) = self.points.solved(parts, &weights);
+        links.successors(robot).into_par_iter().any(|terms| {
+            let more = terms.parameters(robot).into_iter().filter(|p| !self.points.parameters.contains(p));
+            let left = self.points.with_terms(more).together_from(parts, &weights, &near);
+            left.scatter_mm() < MUCH_LARGER * apart_mm
+        })
     }
 
     /// The same with what one robot leaves that has one tool for all parts, and the placements of their groups.

@@ -2,20 +2,22 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, SymmetricEigen, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Point3, Vector3, Vector6};
 
 use super::found::Before;
 use super::suspects::Suspect;
 use crate::difference::Difference;
 use crate::geometry::{Transform, fitted_frame, rotation_matrix, rotation_vector};
 use crate::identify::data::dataset::{Dataset, Pose};
+use crate::identify::data::shared;
 use crate::identify::judge::locate::Trust;
 use crate::identify::judge::placement::Uncertain;
 use crate::identify::residuals::eliminate::Unknowns;
-use crate::identify::residuals::rows::{RowSpec, Rows};
+use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Extra, Raw, Scatter};
-use crate::identify::settings::Model;
+use crate::identify::settings::{Model, Settings};
 use crate::identify::solve::linearised::Linearised;
+use crate::identify::solve::task::Task;
 use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::{Parameter, Robot};
 
@@ -154,18 +156,10 @@ pub(super) fn rows(
     let extras: Vec<Extra> =
         std::iter::once(Extra::Shared(0)).chain(turned).chain((1..=more).map(Extra::Shared)).collect();
     let rotation_rad = trust.rotation_rad.unwrap_or(1e-4).max(LEAST_TURN_RAD);
-    Rows::new(&RowSpec {
-        set: &set,
-        robot,
-        load_chain: robot,
-        parameters,
-        extras: &extras,
-        rows: used,
-        weights: &[],
-        model: if oriented { Model::Pose } else { Model::Position },
-        scatter: Scatter { rotation_rad, ..Scatter::of_point(trust.point_mm) },
-        wire_offset: false,
-    })
+    let model = if oriented { Model::Pose } else { Model::Position };
+    let settings = Settings::default();
+    let task = Task { extras: &extras, model, ..Task::plain(&set, robot, parameters, used, &settings) };
+    task.rows_at(Scatter { rotation_rad, ..Scatter::of_point(trust.point_mm) }, robot)
 }
 
 /// What a millimetre of each coordinate of each place moves the point of each pose by, where the robot alone joined the targets; no columns elsewhere.
@@ -195,12 +189,7 @@ fn places(set: &Dataset, robot: &Robot) -> Vec<Matrix3xX<f64>> {
 
 /// A matrix whose product with itself transposed is this covariance, which its file may hold with rounded digits.
 fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-    let SymmetricEigen { mut eigenvectors, eigenvalues } =
-        (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
-    for (mut vector, value) in eigenvectors.column_iter_mut().zip(eigenvalues.iter()) {
-        vector *= value.max(0.0).sqrt();
-    }
-    eigenvectors
+    shared::root(0.5 * (covariance + covariance.transpose()))
 }
 
 /// White residuals with the columns of the first so many offsets, behind the columns of the target's turn and the placements.
@@ -245,11 +234,15 @@ impl Look {
 
     /// The numbers of a suspect at their best.
     pub(super) fn amounts(&self, directions: &[DVector<f64>]) -> DVector<f64> {
-        let n = directions.len();
-        let weighted = |a: &DVector<f64>, b: &DVector<f64>| self.difference.product(a, b);
-        let normal = DMatrix::from_fn(n, n, |r, c| weighted(&directions[r], &directions[c]));
-        let pull = DVector::from_fn(n, |r, _| weighted(&directions[r], &self.difference.off));
+        let (normal, pull) = self.products(directions);
         pseudo_inverse(normal) * pull
+    }
+
+    /// Products of directions with each other, and with the residuals, in what these are known to.
+    pub(super) fn products(&self, directions: &[DVector<f64>]) -> (DMatrix<f64>, DVector<f64>) {
+        let (n, difference) = (directions.len(), &self.difference);
+        let normal = DMatrix::from_fn(n, n, |r, c| difference.product(&directions[r], &directions[c]));
+        (normal, DVector::from_fn(n, |r, _| difference.product(&directions[r], &difference.off)))
     }
 }
 

@@ -1,19 +1,15 @@
 //! What some rows say of the old robot.
 
 use super::compared::{Compared, Look, rows};
-use super::found::{Before, CauseSeen, Moved, Recheck};
+use super::found::{Before, CauseSeen, Moved, Recheck, Stood};
 use super::looks::Looks;
 use super::moves::{Moves, Off, placements};
 use super::suspects::{Suspect, suspects};
 use crate::difference::Difference;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::placement::Uncertain;
 use crate::identify::residuals::eliminate::Block;
 use crate::robot::{Parameter, Robot};
-
-/// Where the sensor stood by the name of the group.
-pub type Stood<'a> = &'a dyn Fn(&str) -> Option<Uncertain>;
 
 /// What is compared.
 pub(super) struct Comparison<'a> {

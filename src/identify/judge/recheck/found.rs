@@ -6,6 +6,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::identify::judge::locate::Trust;
+use crate::identify::judge::placement::Uncertain;
 use crate::robot::Parameter;
 
 /// Chance that a robot that did not change is said to have changed.
@@ -13,6 +14,9 @@ pub(super) const FALSE_ALARM: f64 = 0.01;
 
 /// The word for files of readings that scatter more than at the identification.
 pub(super) const SCATTER: &str = "scatter";
+
+/// Where the sensor stood by the name of the group.
+pub type Stood<'a> = &'a dyn Fn(&str) -> Option<Uncertain>;
 
 /// The robot as it was.
 #[derive(Debug, Clone)]

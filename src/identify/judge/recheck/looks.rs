@@ -3,7 +3,7 @@
 //! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and those that explain a change.
 //! Goes wrong: causes with the same columns are not told apart, and named together.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 
 use super::compared::Look;
 use super::found::{CauseSeen, FALSE_ALARM};
@@ -132,9 +132,7 @@ impl<'a> Looks<'a> {
         let look = again?;
         let directions = look.directions(suspect);
         let left = look.difference.left_by(&directions)?;
-        let numbers = directions.len();
-        let information =
-            DMatrix::from_fn(numbers, numbers, |i, j| look.difference.product(&directions[i], &directions[j]));
+        let (information, _) = look.products(&directions);
         let covariance = information.try_inverse()? * suspect.variance;
         let off = Off { columns: suspect.columns.clone(), amounts: total.iter().copied().collect(), covariance };
         Some((left, look.difference, off))
@@ -143,6 +141,8 @@ impl<'a> Looks<'a> {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
 
     /// Whether twelve residuals that are known to `sigma` show anything of a cause that adds its amount to each.

@@ -21,8 +21,7 @@ mod suspects;
 mod tests;
 
 pub use along::variances_along;
-pub use comparison::Stood;
-pub use found::{Before, CauseSeen, Moved, Recheck};
+pub use found::{Before, CauseSeen, Moved, Recheck, Stood};
 pub use suspects::zero;
 
 use self::comparison::Comparison;

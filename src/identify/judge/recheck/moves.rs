@@ -3,11 +3,10 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::compared::{self, Compared};
-use super::found::{Before, FALSE_ALARM, Moved};
+use super::found::{Before, FALSE_ALARM, Moved, Stood};
 use crate::difference::{Difference, SEEN};
 use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::judge::placement::Uncertain;
 use crate::identify::model::kinematics::{Kinematics, Place};
 use crate::identify::residuals::eliminate::{Block, Linear, Unknowns};
 use crate::identify::solve::linearised::{Linearised, Placement};
@@ -106,12 +105,7 @@ impl Off {
 }
 
 /// Each placement against where it stood, with a robot that is off by so much.
-pub(super) fn placements(
-    set: &Dataset,
-    compared: &Compared,
-    off: &Off,
-    stood: &dyn Fn(&str) -> Option<Uncertain>,
-) -> Vec<Moved> {
+pub(super) fn placements(set: &Dataset, compared: &Compared, off: &Off, stood: Stood) -> Vec<Moved> {
     let Compared { rows, before, count } = *compared;
     let offsets = compared.offsets(&off.offsets(count));
     let linear = Linearised::new(rows, &offsets);

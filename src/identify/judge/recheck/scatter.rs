@@ -5,7 +5,6 @@
 //! them shows beyond it (F tests), nothing but scatter is told. All figures are then those of the larger scatter. Goes wrong: what follows the pose
 //! in another way than those (a load, play) is scatter too, unless it looks like one of them.
 
-use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::comparison::{Comparison, Said};
@@ -58,8 +57,7 @@ fn beyond_changes(comparison: &Comparison, used: &[usize]) -> Option<(f64, f64)>
         (&looks.look, single.flat_map(|suspect| looks.look.directions(suspect)).collect::<Vec<_>>());
     let difference = &look.difference;
     let n = directions.len();
-    let normal = DMatrix::from_fn(n, n, |i, j| difference.product(&directions[i], &directions[j]));
-    let pull = DVector::from_fn(n, |i, _| difference.product(&directions[i], &difference.off));
+    let (normal, pull) = look.products(&directions);
     let inverse = pseudo_inverse(normal.clone());
     let gain = pull.dot(&(&inverse * &pull));
     let rank = (inverse * &normal).trace().round();

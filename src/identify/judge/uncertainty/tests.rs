@@ -1,16 +1,22 @@
 use super::*;
 use crate::identify::judge::errors::Judge;
+use crate::identify::run::Identification;
 use crate::identify::synthetic;
 use crate::measurements::Role;
+
+/// What so many rows of one sphere tell, and rows of it to verify.
+fn of_one_sphere(samples: usize, seed: u64) -> (Dataset, Identification) {
+    let mut world = synthetic::planned(4 * samples, 160, 25.0, 0.1, seed, &|_| {});
+    world.rows.retain(|row| row.at.group == "g0" && row.at.role != Role::Center);
+    world.identified(&world.rows)
+}
 
 #[test]
 fn poses_that_were_fitted_are_no_better_known_than_others_like_them() {
     for samples in [12, 20, 50] {
         let (mut of_fitted, mut of_others) = (0.0, 0.0);
         for seed in 1..5 {
-            let mut world = synthetic::planned(4 * samples, 160, 25.0, 0.1, seed, &|_| {});
-            world.rows.retain(|row| row.at.group == "g0" && row.at.role != Role::Center);
-            let (set, found) = world.identified(&world.rows);
+            let (set, found) = of_one_sphere(samples, seed);
             let Some(formulation) = found.formulation() else { continue };
             let at = |rows: &[usize]| Expected::at(formulation, &set, &found.fitted, rows).of_robot_mm;
             of_fitted += at(&found.fitted);
@@ -27,9 +33,7 @@ fn nineteen_of_twenty_errors_at_fresh_poses_are_below_what_is_promised() {
     for samples in [10, 12, 16, 30] {
         let (mut below, mut all) = (0, 0);
         for seed in 100..130 {
-            let mut world = synthetic::planned(4 * samples, 160, 25.0, 0.1, seed, &|_| {});
-            world.rows.retain(|row| row.at.group == "g0" && row.at.role != Role::Center);
-            let (set, found) = world.identified(&world.rows);
+            let (set, found) = of_one_sphere(samples, seed);
             let Some(formulation) = found.formulation() else { continue };
             let fresh = set.verify_rows();
             let p95_mm = Expected::at(formulation, &set, &found.fitted, &fresh).p95_mm;

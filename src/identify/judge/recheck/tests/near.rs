@@ -1,17 +1,9 @@
 //! What poses near to each other, or outside of what was identified, leave open.
 
-use nalgebra::{DMatrix, Matrix6};
+use nalgebra::DMatrix;
 
 use super::*;
 use crate::robot::corrections::Wave;
-
-/// Where the sensor of group 2 stands as the found robot has it, `shift_mm` further.
-fn stood(cell: &Cell, shift_mm: f64) -> Uncertain {
-    let first = |robot: &Robot| robot.joints[0].previous_from_this(0.0);
-    let mut transform = synthetic::sensor(2) * first(&cell.truth) * first(&cell.found).inverse();
-    transform.translation.vector.x += shift_mm;
-    Uncertain { transform, covariance: Matrix6::from_diagonal_element(1e-9) }
-}
 
 /// Ten poses within so many degrees of the first, by the true robot as it has become.
 fn near(cell: &Cell, within_deg: f64, fault: &dyn Fn(&mut Robot), seed: u64) -> Dataset {
@@ -35,8 +27,7 @@ fn near(cell: &Cell, within_deg: f64, fault: &dyn Fn(&mut Robot), seed: u64) -> 
 fn poses_near_to_each_other_call_no_robot_the_same() {
     let cell = cell(false, 4);
     let said = |set: &Dataset, shift_mm: f64| {
-        let stood = stood(&cell, shift_mm);
-        recheck(set, &cell.found, &cell.before, &|_| Some(stood.clone())).unwrap()
+        recheck(set, &cell.found, &cell.before, &|_| Some(stood(&cell, shift_mm))).unwrap()
     };
     let mut seen = 0;
     for (k, within_deg) in [0.1, 1.0, 2.0].into_iter().enumerate() {
@@ -68,8 +59,7 @@ fn poses_that_see_every_joint_tell_a_moved_sensor_from_a_changed_robot() {
         let cell = cell(false, seed);
         let set = Dataset::new(&cell.rows(&|_| {}, 10, 61)).unwrap();
         for shift_mm in [2.0, 7.0] {
-            let stood = stood(&cell, shift_mm);
-            let found = recheck(&set, &cell.found, &cell.before, &|_| Some(stood.clone())).unwrap();
+            let found = recheck(&set, &cell.found, &cell.before, &|_| Some(stood(&cell, shift_mm))).unwrap();
             assert_eq!(found.cause(), "camera-moved|joint-1", "{}", found.statement());
             // By as much as they leave open.
             let room_mm = found.at_most_mm.max(found.elsewhere_mm);
