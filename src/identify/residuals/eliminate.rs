@@ -71,12 +71,7 @@ impl Block {
     }
 
     pub fn row_count(&self) -> usize {
-        match self {
-            Block::Distances(distances) => distances.lengths.len(),
-            Block::Touch(touch) => touch.row_count(),
-            Block::Points(points) => points.rows_a_spot() * points.spots.len(),
-            Block::Pairwise(pairs) => pairs.row_count(),
-        }
+        self.row_poses().len()
     }
 
     /// Numbers that were measured with some weight, less the unknowns.

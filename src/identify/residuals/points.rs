@@ -8,7 +8,7 @@ use crate::geometry::{
     Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
 };
 use crate::identify::model::kinematics::Place;
-use crate::identify::sensor::{Extra, Raw, Spot};
+use crate::identify::sensor::{Raw, Spot};
 use crate::robot::jacobian::RAD_PER_MRAD;
 
 /// Points are on a line where they are scattered square to it by less than this share of what they are along it.
@@ -60,12 +60,6 @@ impl Points {
     pub fn count(&self) -> usize {
         let of_spot = |s: &Spot| if self.oriented && s.rotation.is_some() { 6 } else { 3 };
         self.spots.iter().filter(|s| s.weight > 0.0).map(of_spot).sum()
-    }
-
-    /// Indices and axes of the extra unknowns that turn the target.
-    pub fn target_extras(extras: &[Extra]) -> Vec<(usize, usize)> {
-        let axis = |(k, e): (usize, &Extra)| if let Extra::Target(axis) = e { Some((k, *axis)) } else { None };
-        extras.iter().enumerate().filter_map(axis).collect()
     }
 
     /// `flange_from_target` as the extra unknowns turn it.

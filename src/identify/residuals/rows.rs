@@ -19,31 +19,26 @@ use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::data::targets::middle;
 use crate::identify::model::kinematics::{Kinematics, Place};
-use crate::identify::sensor::{Extra, Length, Raw, Scatter, Spot};
-use crate::identify::settings::Model;
+use crate::identify::sensor::{Extra, Length, Raw, Scatter, SmoothError, Spot};
+use crate::identify::settings::{Model, Settings};
 use crate::robot::{Parameter, Robot};
 
-/// What to build residuals from.
+/// Of what a formulation is made.
 #[derive(Debug, Clone, Copy)]
-pub struct RowSpec<'a> {
+pub struct Task<'a> {
     pub set: &'a Dataset,
-    /// The robot whose parameters are offset.
+    /// The nominal robot.
     pub robot: &'a Robot,
-    /// The robot on whose chain weights have their levers: where `robot` is going.
-    pub load_chain: &'a Robot,
     /// The parameters that may move.
     pub parameters: &'a [Parameter],
     /// Unknowns of the sensor that may move.
     pub extras: &'a [Extra],
-    /// Rows to use, ascending.
+    /// Rows to fit, ascending.
     pub rows: &'a [usize],
-    /// Roots of the rows' weights, one a row of the data set; empty where all count fully.
-    pub weights: &'a [f64],
     pub model: Model,
-    /// Scatter beyond the measurement's covariance.
-    pub scatter: Scatter,
-    /// Whether a wire's zero is unknown.
-    pub wire_offset: bool,
+    /// A smooth error that the points of a placement share.
+    pub smooth: Option<SmoothError>,
+    pub settings: &'a Settings,
 }
 
 /// The rows of a data set under a residual model, before it is known what they determine.
@@ -62,8 +57,9 @@ pub struct Rows {
 
 impl Rows {
     /// Builds the blocks. Rows whose group has nothing to measure from are left out.
-    pub fn new(spec: &RowSpec) -> Rows {
-        let RowSpec { set, robot, load_chain, parameters, rows, .. } = *spec;
+    /// Gravity has its levers on `load_chain`; `weights` are roots of the rows' weights, one a row of the data set, or none where all count fully.
+    pub fn new(task: &Task, scatter: Scatter, weights: &[f64], load_chain: &Robot) -> Rows {
+        let Task { set, robot, parameters, rows, .. } = *task;
         let mut used: Vec<usize> = rows.to_vec();
         // A centre is a place that distances need, wherever its row went.
         used.extend(set.groups.iter().filter_map(|g| g.center).filter(|c| !rows.contains(c)));
@@ -72,8 +68,8 @@ impl Rows {
         let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
         let places = kinematics.places(&vec![0.0; parameters.len()], false);
         let by_group = (0..set.groups.len()).map(|group| set.of_group(rows, group)).collect();
-        let blocks = Inputs { spec, used: &used, places: &places, by_group }.blocks();
-        Rows { kinematics, rows: used, blocks, scatter: spec.scatter, extras: spec.extras.to_vec() }
+        let blocks = Inputs { task, scatter, weights, used: &used, places: &places, by_group }.blocks();
+        Rows { kinematics, rows: used, blocks, scatter, extras: task.extras.to_vec() }
     }
 
     /// Number of offsets: the robot's parameters, then the extra unknowns.
@@ -209,7 +205,9 @@ fn point_extra(set: &Dataset, row: usize, point_mm: &Point3<f64>, extras: &[Extr
 }
 
 struct Inputs<'a> {
-    spec: &'a RowSpec<'a>,
+    task: &'a Task<'a>,
+    scatter: Scatter,
+    weights: &'a [f64],
     used: &'a [usize],
     places: &'a [Place],
     by_group: Vec<Vec<usize>>,
@@ -222,23 +220,23 @@ impl Inputs<'_> {
     }
 
     fn weight(&self, row: usize) -> f64 {
-        self.spec.weights.get(row).copied().unwrap_or(1.0)
+        self.weights.get(row).copied().unwrap_or(1.0)
     }
 
     fn blocks(&self) -> Vec<Block> {
-        let groups = 0..self.spec.set.groups.len();
-        match (self.spec.set.kind, self.spec.model) {
+        let groups = 0..self.task.set.groups.len();
+        match (self.task.set.kind, self.task.model) {
             (Kind::Distances, _) => groups.filter_map(|g| self.measured_distances(g)).chain(self.touches()).collect(),
             (Kind::Positions, Model::CenterDistance) => groups.filter_map(|g| self.center_distances(g)).collect(),
             (Kind::Positions, Model::PairwiseDistance) => groups.flat_map(|g| self.pairs(g)).collect(),
-            (Kind::Positions, Model::Position | Model::Pose) => self.points(self.spec.model == Model::Pose),
+            (Kind::Positions, Model::Position | Model::Pose) => self.points(self.task.model == Model::Pose),
         }
     }
 
     fn measured_distances(&self, group: usize) -> Option<Block> {
-        let extras = self.spec.extras;
+        let extras = self.task.extras;
         let zero = |e: &Extra| if *e == Extra::Zero { 1.0 } else { 0.0 };
-        let length = |&i: &usize| match self.spec.set.poses[i].reading {
+        let length = |&i: &usize| match self.task.set.poses[i].reading {
             Reading::Distance { distance_mm, sigma_mm } if distance_mm > 0.0 => Some(Length {
                 pose: self.place_of(i),
                 length_mm: distance_mm,
@@ -252,16 +250,16 @@ impl Inputs<'_> {
         if lengths.is_empty() {
             return None;
         }
-        let from = match self.spec.set.groups[group].center.map(|c| self.place_of(c)) {
+        let from = match self.task.set.groups[group].center.map(|c| self.place_of(c)) {
             Some(center) => Origin::Center(center),
-            None => Origin::Anchor(first_anchor(self.places, &lengths), self.spec.wire_offset),
+            None => Origin::Anchor(first_anchor(self.places, &lengths), self.task.settings.wire_offset),
         };
         Some(Block::Distances(Distances { lengths, from }))
     }
 
     /// One block for all sockets that known distances tie together.
     fn touches(&self) -> Vec<Block> {
-        let set = self.spec.set;
+        let set = self.task.set;
         let touches = |group: usize| self.by_group[group].iter().copied().filter(|&i| set.touches(i));
         let touched = || (0..set.groups.len()).filter(|&group| touches(group).next().is_some());
         // The lowest group that a group is tied to, by repeated lowering: there are few.
@@ -294,7 +292,7 @@ impl Inputs<'_> {
     }
 
     fn spot(&self, row: usize) -> Option<Spot> {
-        let (pose, weight) = (&self.spec.set.poses[row], self.weight(row));
+        let (pose, weight) = (&self.task.set.poses[row], self.weight(row));
         let point_mm = pose.reading.point_mm()?;
         let covariance_mm2 = pose.reading.covariance_mm2().unwrap_or_else(Matrix3::zeros);
         Some(Spot {
@@ -302,15 +300,15 @@ impl Inputs<'_> {
             point_mm,
             on_body_mm: pose.on_body_mm,
             covariance_mm2,
-            whitener: self.spec.scatter.whitener(&covariance_mm2) * weight,
+            whitener: self.scatter.whitener(&covariance_mm2) * weight,
             rotation: pose.reading.rotation_rad().map(|r| Rotation3::new(r).into_inner()),
             weight,
-            extra: point_extra(self.spec.set, row, &point_mm, self.spec.extras),
+            extra: point_extra(self.task.set, row, &point_mm, self.task.extras),
         })
     }
 
     fn center_distances(&self, group: usize) -> Option<Block> {
-        let reference = self.spec.set.reference(group, self.spec.rows)?;
+        let reference = self.task.set.reference(group, self.task.rows)?;
         let center = self.spot(reference)?;
         let length = |&i: &usize| {
             let spot = self.spot(i).filter(|spot| spot.on_body_mm.is_none())?;
@@ -340,7 +338,7 @@ impl Inputs<'_> {
         (0..chunks)
             .map(chunk)
             .filter(|c| c.len() > 2)
-            .filter_map(|c| Pairs::new(c, &self.spec.scatter))
+            .filter_map(|c| Pairs::new(c, &self.scatter))
             .map(Block::Pairwise)
             .collect()
     }
@@ -352,17 +350,17 @@ impl Inputs<'_> {
             .map(|rows| rows.iter().filter_map(|&i| self.spot(i)).collect::<Vec<_>>())
             .filter(|spots| spots.len() >= 3)
             .collect();
-        let of_body = |spot: &Spot| spot.on_body_mm.is_some() && !self.spec.set.are_on_flange();
+        let of_body = |spot: &Spot| spot.on_body_mm.is_some() && !self.task.set.are_on_flange();
         let turned = oriented || lists.iter().flatten().any(of_body);
         let (frames, flange_from_target) = frames_and_turn(&lists, self.places, turned);
-        let target = if turned { Points::target_extras(self.spec.extras) } else { Vec::new() };
-        let scatter = &self.spec.scatter;
+        let axis = |(k, e): (usize, &Extra)| if let Extra::Target(axis) = e { Some((k, *axis)) } else { None };
+        let target: Vec<_> = self.task.extras.iter().enumerate().filter_map(axis).filter(|_| turned).collect();
         let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
             let target = target.clone();
             let on_a_line = Points::are_on_a_line(&spots);
             let mut points =
                 Points { spots, sensor_from_base, on_a_line, flange_from_target, oriented, target, field: None };
-            points.field = scatter.smooth.map(|error| {
+            points.field = self.scatter.smooth.map(|error| {
                 let spots: Vec<_> = points.spots.iter().map(|s| (s.point_mm, s.whitener)).collect();
                 Box::new(Field::new(&spots, points.rows_a_spot(), error))
             });

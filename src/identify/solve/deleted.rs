@@ -59,14 +59,6 @@ pub struct Deleted {
 }
 
 impl Deleted {
-    /// Sets what it is judged by, from the white sum of squares of all rows and its degrees of freedom: where the row is in the fit its own share
-    /// comes off.
-    fn judged_by(&mut self, squares: f64, freedom: f64, is_fitted: bool) {
-        let own = if is_fitted { (self.square, self.numbers as f64) } else { (0.0, 0.0) };
-        self.freedom = (freedom - own.1).max(1.0);
-        self.variance = (squares - own.0).max(0.0) / self.freedom;
-    }
-
     /// In standard deviations of the others, as of one normal number.
     fn size(&self) -> f64 {
         let square = self.square / self.variance.max(f64::MIN_POSITIVE);
@@ -97,7 +89,7 @@ impl Robust<'_> {
             if out.is_empty() {
                 break;
             }
-            let deleted = self.deleted();
+            let (deleted, _) = self.deleted();
             let still: Vec<usize> =
                 out.iter().copied().filter(|&r| deleted[r].size() > READMITTED_WITHIN * sigmas).collect();
             if still.len() == out.len() {
@@ -110,7 +102,7 @@ impl Robust<'_> {
 
     /// The rows of the fit that are further off than chance allows, without those that were left out.
     pub fn doubtful(&self, out: &[usize]) -> Vec<usize> {
-        let deleted = self.deleted();
+        let (deleted, _) = self.deleted();
         let rows: Vec<usize> = self.task.rows.iter().copied().filter(|r| !out.contains(r)).collect();
         let share = DOUBT / (2 * rows.len().max(1)) as f64;
         let far = |row: &usize| {
@@ -127,7 +119,7 @@ impl Robust<'_> {
         let mut weights = self.weights.clone();
         others.iter().for_each(|&row| weights[row] = NEGLIGIBLE);
         let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
-        let deleted = with.deleted();
+        let (deleted, _) = with.deleted();
         let far = others.iter().copied().filter(|&r| deleted[r].size() > sigmas);
         let far: BTreeSet<usize> = far.chain(self.far_off_alone(others, sigmas)).collect();
         far.into_iter().collect()
@@ -149,17 +141,9 @@ impl Robust<'_> {
         far
     }
 
-    /// All rows of the data set against what the others predict for them; of those that are not in the fit nothing.
-    pub fn deleted(&self) -> Vec<Deleted> {
-        self.all_deleted().0
-    }
-
-    /// The known distances of the data set against what everything else says of them, in their own standard deviations.
-    pub fn deleted_known(&self) -> Vec<f64> {
-        self.all_deleted().1
-    }
-
-    fn all_deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
+    /// All rows of the data set against what the others predict for them, of those that are not in the fit nothing; and the known distances of the
+    /// data set against what everything else says of them, in their own standard deviations.
+    pub fn deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
         let (rows, problem, prior) = self.linearised();
         let of_placement = |placement: &Placement| {
             let Eliminated { normal, follow, inverse } = placement.eliminated();
@@ -207,7 +191,10 @@ impl Robust<'_> {
         let freedom =
             (numbers as f64 - unknowns as f64 - determined).max(numbers.div_ceil(LEAST_FREEDOM).max(1) as f64);
         for (row, d) in deleted.iter_mut().enumerate() {
-            d.judged_by(squares, freedom, weight(row) > NEGLIGIBLE);
+            // Where the row is in the fit its own share comes off.
+            let own = if weight(row) > NEGLIGIBLE { (d.square, d.numbers as f64) } else { (0.0, 0.0) };
+            d.freedom = (freedom - own.1).max(1.0);
+            d.variance = (squares - own.0).max(0.0) / d.freedom;
         }
         (deleted, of_known)
     }

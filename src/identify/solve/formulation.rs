@@ -195,7 +195,10 @@ impl Formulation {
     /// That of all parameters and extras, parameters that are `held` taken as they are.
     pub fn offsets_covariance(&self, held: &dyn Fn(Parameter) -> bool) -> DMatrix<f64> {
         if !self.held || !self.scale_seen {
-            let spread = whole_spread(self.spread(), self.rows.extras.len());
+            let (spread, extras) = (self.spread(), self.rows.extras.len());
+            let (rows, columns) = spread.shape();
+            let mut spread = spread.resize(rows + extras, columns + extras, 0.0);
+            spread.view_mut((rows, columns), (extras, extras)).fill_with_identity();
             return &spread * self.covariance() * spread.transpose();
         }
         let (_, jacobian) = self.rows.evaluate(&self.offsets_of(), true);
@@ -297,14 +300,6 @@ impl<'a> Estimate<'a> {
         }
         Ok((rows, self.base, free_fit.ok_or(Error::NotFinite)?))
     }
-}
-
-/// All offsets from base parameters and extras.
-fn whole_spread(spread: DMatrix<f64>, extras: usize) -> DMatrix<f64> {
-    let (rows, columns) = spread.shape();
-    let mut whole = spread.resize(rows + extras, columns + extras, 0.0);
-    whole.view_mut((rows, columns), (extras, extras)).fill_with_identity();
-    whole
 }
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {

@@ -92,7 +92,7 @@ impl<'a> Task<'a> {
         let mut weights = vec![1.0; self.set.poses.len()];
         let mut residuals = Vec::new();
         for _ in 0..PLACING_ROUNDS {
-            let rows = Rows::new(&self.spec(Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot));
+            let rows = Rows::new(self, Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot);
             residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
             let typical = typical_mm(&residuals);
             if typical > hopeless_mm {
@@ -153,7 +153,7 @@ const LOOSE: Tolerance = Tolerance { lengths_mm: 3.0, target_mm: 100.0, gravity_
 impl Robust<'_> {
     /// The rows with their weights.
     fn rows(&self) -> Rows {
-        Rows::new(&self.task.spec(self.scatter, &self.weights, &self.robot))
+        Rows::new(&self.task, self.scatter, &self.weights, &self.robot)
     }
 
     fn residuals(&self) -> Vec<Residual> {

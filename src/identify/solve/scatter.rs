@@ -137,12 +137,7 @@ pub(super) fn robust_scale(
 
 /// Robust standard deviation of the sizes of these rows: their median over that of a normal number's absolute value.
 fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
-    let mut list: Vec<f64> = rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0).collect();
-    if list.is_empty() {
-        return 0.0;
-    }
-    let middle = list.len() / 2;
-    *list.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745
+    median(rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0)).map_or(0.0, |middle| middle / 0.6745)
 }
 
 /// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the fit left. With

@@ -9,31 +9,14 @@ use crate::identify::Error;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::model::base::Base;
 use crate::identify::model::prior::Tolerance;
-use crate::identify::residuals::rows::{RowSpec, Rows};
-use crate::identify::sensor::{Extra, Scatter, SmoothError};
+use crate::identify::residuals::rows::Rows;
+pub use crate::identify::residuals::rows::Task;
+use crate::identify::sensor::{Extra, Scatter};
 use crate::identify::settings::{Model, Prior, Redundancy, Settings};
 use crate::robot::{Parameter, Robot, Unit};
 
 /// Scatter before anything is known, mm: about a good robot's after calibration.
 pub const FIRST_SCATTER_MM: f64 = 0.1;
-
-/// Of what a formulation is made.
-#[derive(Debug, Clone, Copy)]
-pub struct Task<'a> {
-    pub set: &'a Dataset,
-    /// The nominal robot.
-    pub robot: &'a Robot,
-    /// The parameters that may move.
-    pub parameters: &'a [Parameter],
-    /// Unknowns of the sensor that may move.
-    pub extras: &'a [Extra],
-    /// Rows to fit.
-    pub rows: &'a [usize],
-    pub model: Model,
-    /// A smooth error that the points of a placement share.
-    pub smooth: Option<SmoothError>,
-    pub settings: &'a Settings,
-}
 
 /// How far the target must lie from where the file has it that what turns about it is worth a look: a mrad at such a lever is a micrometre.
 const FAR_MM: f64 = 1.0;
@@ -51,21 +34,6 @@ impl<'a> Task<'a> {
         Task { set, robot, parameters, extras: set.target_unknowns(false), rows, model, smooth: None, settings }
     }
 
-    pub(super) fn spec(&self, scatter: Scatter, weights: &'a [f64], load_chain: &'a Robot) -> RowSpec<'a> {
-        RowSpec {
-            set: self.set,
-            robot: self.robot,
-            load_chain,
-            parameters: self.parameters,
-            extras: self.extras,
-            rows: self.rows,
-            weights,
-            model: self.model,
-            scatter,
-            wire_offset: self.settings.wire_offset,
-        }
-    }
-
     /// Whether anything that was measured sees the robot's size.
     pub(super) fn scale_is_seen(&self) -> bool {
         let set = self.set;
@@ -75,7 +43,7 @@ impl<'a> Task<'a> {
 
     /// The rows with a scatter that is known.
     pub fn rows_at(&self, scatter: Scatter, load_chain: &Robot) -> Rows {
-        Rows::new(&self.spec(scatter, &[], load_chain))
+        Rows::new(self, scatter, &[], load_chain)
     }
 
     /// What the poses determine, seen from the nominal robot.
