@@ -37,13 +37,13 @@ pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
         ));
     }
     lines.extend(placement.flange_from_target.as_ref().map(|target| line("flange from target", target)));
-    lines.push(match fit.freedom {
+    lines.push(match fit.misfit.freedom {
         0 => format!(
             "{poses} poses are as many as the placement takes: none is left to check the robot by; add two or more"
         ),
         freedom => format!(
             "{poses} poses fit to {:.4} mm; chi-squared {:.1} over {freedom} degrees of freedom",
-            fit.rms_mm, fit.chi_square
+            fit.misfit.rms_mm, fit.misfit.chi_square
         ),
     });
     let of_robot = match fit.robot_uncertain {

@@ -101,7 +101,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
     let extras = shared::unknowns(set, settings);
     let task = Task { extras: &extras, ..Task::plain(&alike, robot, &parameters, &rows, settings) };
     let robust = task.robust(Loss::Absolute)?;
-    let deleted = robust.deleted();
+    let (deleted, _) = robust.deleted();
     let unit_mm2 = robust.scatter.stated * middle_mm2 + robust.scatter.point_mm.powi(2);
     let of_group = |(name_of, stated_mm2): (&&str, &f64)| {
         let rows: Vec<_> = of_groups[name_of].iter().map(|&row| deleted[row]).filter(|d| d.numbers > 0).collect();

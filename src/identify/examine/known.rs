@@ -130,7 +130,7 @@ fn sizes(set: &Dataset, robot: &Robot, rows: &[usize], settings: &Settings) -> R
         return Ok(Vec::new());
     }
     let parameters = robot.mdh_parameters();
-    Ok(Task::plain(set, robot, &parameters, rows, settings).robust(Loss::Absolute)?.deleted_known())
+    Ok(Task::plain(set, robot, &parameters, rows, settings).robust(Loss::Absolute)?.deleted().1)
 }
 
 #[cfg(test)]
@@ -139,18 +139,15 @@ mod tests {
     use crate::identify::synthetic;
     use crate::measurements::Role;
 
+    fn known(a: usize, b: usize, distance_mm: f64) -> KnownDistance {
+        KnownDistance { a, b, distance_mm, stated_sigma_mm: Some(0.01) }
+    }
+
     /// What is left of so many known distances, of which the second is off, and what is said.
     fn examined(count: usize, off_mm: f64) -> (usize, Vec<Finding>) {
         let (world, sockets) = synthetic::touched(0.0, 3);
         let mut set = Dataset::new(&world.rows).unwrap();
-        set.known = (0..count)
-            .map(|k| KnownDistance {
-                a: k,
-                b: k + 4,
-                distance_mm: (sockets[k] - sockets[k + 4]).norm(),
-                stated_sigma_mm: Some(0.01),
-            })
-            .collect();
+        set.known = (0..count).map(|k| known(k, k + 4, (sockets[k] - sockets[k + 4]).norm())).collect();
         set.known[1].distance_mm += off_mm;
         let (left, findings) = examine(&set, &world.nominal, &Settings::default());
         (left.known.len(), findings)
@@ -183,9 +180,7 @@ mod tests {
             world.rows[3].at.joints_deg[1] += by_deg;
             let mut set = Dataset::new(&world.rows).unwrap();
             let length = |a: usize, b: usize| (sockets[a] - sockets[b]).norm();
-            set.known = [(0, 2, length(0, 4)), (1, 3, length(1, 5))]
-                .map(|(a, b, distance_mm)| KnownDistance { a, b, distance_mm, stated_sigma_mm: Some(0.01) })
-                .to_vec();
+            set.known = vec![known(0, 2, length(0, 4)), known(1, 3, length(1, 5))];
             let (left, findings) = examine(&set, &world.nominal, &Settings::default());
             assert_eq!((left.known.len(), findings), (2, Vec::new()), "{by_deg}");
             set.known[1].distance_mm += 2.0;
@@ -210,13 +205,7 @@ mod tests {
         let length = |k: usize| (sockets[k] - sockets[k + 4]).norm();
         let of = |factors: &[f64]| {
             let mut set = Dataset::new(&world.rows).unwrap();
-            let known = |(k, f): (usize, &f64)| KnownDistance {
-                a: k,
-                b: k + 4,
-                distance_mm: f * length(k),
-                stated_sigma_mm: Some(0.01),
-            };
-            set.known = factors.iter().enumerate().map(known).collect();
+            set.known = factors.iter().enumerate().map(|(k, f)| known(k, k + 4, f * length(k))).collect();
             set
         };
         for factor in [0.01, 0.1, 0.3, 10.0] {

@@ -240,7 +240,7 @@ impl<'a> Search<'a> {
         let mut best: Option<(f64, usize, &Placed)> = None;
         for placed in &self.placed {
             let order: Vec<usize> = (0..placed.rows.len()).collect();
-            if let Some((gain, k)) = placed.best_step(&order)
+            if let Some((gain, k)) = placed.best_step(&placed.fresh, &order)
                 && best.is_none_or(|(g, ..)| gain > g)
             {
                 best = Some((gain, placed.rows[k].0, placed));
@@ -251,7 +251,8 @@ impl<'a> Search<'a> {
             return None;
         }
         if placed.rivalled {
-            let rival = self.orders(placed).iter().filter_map(|o| Some(placed.best_step(o)?.0)).fold(0.0, f64::max);
+            let gain_along = |order: &Vec<usize>| Some(placed.best_step(&placed.fresh, order)?.0);
+            let rival = self.orders(placed).iter().filter_map(gain_along).fold(0.0, f64::max);
             let drifts = drifting.contains(self.name(placed));
             if gain < SHARE * placed.squares || (gain < BEATS * rival && !drifts) {
                 return None;
@@ -280,7 +281,7 @@ impl<'a> Search<'a> {
         let order: Vec<usize> = (0..placed.rows.len()).collect();
         let likelihood = |fresh: &Fresh, gain: f64| self.likelihood(gain, fresh.columns.ncols());
         let is_cut = cut.is_some_and(|cut| placed.rows.iter().any(|(row, _)| *row == cut));
-        let step = |fresh: &Fresh| Some(likelihood(fresh, placed.best_step_of(fresh, &order)?.0));
+        let step = |fresh: &Fresh| Some(likelihood(fresh, placed.best_step(fresh, &order)?.0));
         let of_steps = placed.causes().filter(|_| is_cut).filter_map(|(_, fresh)| step(fresh));
         let best_step = of_steps.fold(f64::NEG_INFINITY, f64::max);
         let orders = if is_cut { Vec::new() } else { self.orders(placed) };
@@ -318,12 +319,8 @@ impl Placed {
             .chain(self.zeros.iter().enumerate().map(|(joint, zero)| (Some(joint), zero)))
     }
 
-    /// The place in `order` from which on a new placement gains most, with what it gains.
-    fn best_step(&self, order: &[usize]) -> Option<(f64, usize)> {
-        self.best_step_of(&self.fresh, order)
-    }
-
-    fn best_step_of(&self, fresh: &Fresh, order: &[usize]) -> Option<(f64, usize)> {
+    /// The place in `order` from which on fresh columns gain most, with what they gain.
+    fn best_step(&self, fresh: &Fresh, order: &[usize]) -> Option<(f64, usize)> {
         let mut products = fresh.nothing();
         let mut best: Option<(f64, usize)> = None;
         for (late, &k) in order.iter().rev().enumerate() {

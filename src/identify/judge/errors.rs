@@ -226,14 +226,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_of_three_errors() {
+    fn figures_of_three_errors_of_one_and_of_none() {
         let spread = Spread::new([-1.0, 2.0, -3.0]);
         assert_eq!((spread.count, spread.mean_abs_mm, spread.std_mm), (3, Some(2.0), Some(1.0)));
         assert_eq!((spread.max_abs_mm, spread.min_abs_mm), (Some(3.0), Some(1.0)));
-    }
-
-    #[test]
-    fn figures_of_nothing_are_none() {
         assert_eq!(Spread::new([]).mean_abs_mm, None);
         assert_eq!(Spread::new([1.0]).std_mm, None);
     }

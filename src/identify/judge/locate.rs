@@ -8,14 +8,12 @@
 //! with that direction; a robot that is wrong in a way that a placement can take up is not seen.
 
 mod agreement;
-mod stray;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use self::agreement::{Agreement, Misfit, agreement, misfit};
-use self::stray::{Stray, alone};
+use self::agreement::{Agreement, Misfit, Stray, agreement, alone, misfit};
 use super::placement::{Placed, is_held};
 use crate::diagnostic::two_digits;
 use crate::identify::Error;
@@ -74,12 +72,9 @@ pub struct Fit {
     /// The row that contradicts them, and is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stray: Option<Stray>,
-    /// Root mean square of a point's residual, mm.
-    pub rms_mm: f64,
-    /// Squared residuals of points over what is stated of them.
-    pub chi_square: f64,
-    /// Degrees of freedom of it.
-    pub freedom: usize,
+    /// How far they miss the robot.
+    #[serde(flatten)]
+    pub misfit: Misfit,
     /// Whether the points contradict the robot.
     pub contradicted: bool,
     /// Whether they miss the robot by more than is known of it, and nothing tells whether robot or instrument is off.
@@ -104,7 +99,7 @@ impl Fit {
     /// What speaks against the placement, for a person; `None` where nothing does.
     pub fn objection(&self) -> Option<String> {
         // A row has three numbers.
-        let is_told = self.freedom > 3;
+        let is_told = self.misfit.freedom > 3;
         match (self.contradicted || self.doubted, &self.stray) {
             (true, _) if !is_told => Some(Fit::TOO_FEW.to_owned()),
             (true, _) => Some(if self.contradicted { Fit::CONTRADICTED } else { Fit::DOUBTED }.to_owned()),
@@ -183,15 +178,12 @@ fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located,
     let placed = Placed::new(task.set, &rows, &of_all, &vec![0.0; of_all.len()], &shared, student);
     let mut placed = placed.ok_or(Error::NothingDetermined { poses: task.rows.len() })?;
     placed.target_found = !task.parameters.is_empty();
-    let of_points = misfit(task, trust.point_mm, &offsets);
-    let Misfit { chi_square, freedom, rms_mm } = of_points;
-    let agreement = agreement(task, trust.point_mm, of_points);
+    let misfit = misfit(task, trust.point_mm, &offsets);
+    let agreement = agreement(task, trust.point_mm, misfit);
     let fit = Fit {
         poses: task.rows.len(),
         stray: None,
-        rms_mm,
-        chi_square,
-        freedom,
+        misfit,
         contradicted: agreement == Agreement::Contradicted,
         doubted: agreement == Agreement::Doubted,
         robot_uncertain: open.is_some(),

@@ -1,4 +1,6 @@
 //! Whether to use the robot that was found, and the warnings in the order of their weight.
+//!
+//! In: the record as it is, and what was found. What goes wrong: readings that scatter by millimetres, and hide errors that no robot has.
 
 use nalgebra::Point3;
 
@@ -10,6 +12,7 @@ use super::rounded;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::still::constant_joints;
 use crate::identify::data::unused;
+use crate::identify::examine::conventions;
 use crate::identify::examine::in_hand::most_points;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Spread;
@@ -21,7 +24,10 @@ use crate::robot::{Advice, Robot};
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
 /// Error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
-pub(super) const IMPLAUSIBLE_MM: f64 = 20.0;
+const IMPLAUSIBLE_MM: f64 = 20.0;
+
+/// Times what the fit promises, and what it left, that errors of other rows are not for want of rows.
+const FAR_OFF: f64 = 20.0;
 
 impl Record {
     /// The reason with what to do about it, as the warnings have it.
@@ -73,6 +79,30 @@ impl Record {
         self.warnings.extend(self.zero_of_readings(found));
         self.warnings.extend(sentences(&unused::unused(set)));
         self.warnings.extend(self.undetermined());
+    }
+
+    /// What is farther off than a robot can be, if anything.
+    pub(super) fn far_off(&self, set: &Dataset, found: &Identification) -> Option<Finding> {
+        match found.formulation() {
+            None => [&self.before.fit, self.before.judged()].into_iter().find_map(of_nominal),
+            Some(_) => self.of_other_rows(set, found),
+        }
+    }
+
+    fn of_other_rows(&self, set: &Dataset, found: &Identification) -> Option<Finding> {
+        let figures = &self.chosen_method()?.quality;
+        let (off, _) = size_mm(figures.judged())?;
+        let (left, _) = size_mm(&figures.fit)?;
+        let expected = self.expected.as_ref().map_or(0.0, |expected| expected.mean_mm);
+        if off < FAR_OFF * left.max(expected) || off < conventions::IMPLAUSIBLE_MM {
+            return None;
+        }
+        let which = if self.folded { "rows that were left out of the fit" } else { "the verify rows" };
+        let said = format!(
+            "{which} are off by {off:.3} mm on average, those of the fit by {left:.3} mm: they were misread, or are not of the robot that was fitted"
+        );
+        let rows = set.names(&found.verify_outliers);
+        Some(Finding::new(said, "look at these rows, or measure others").about(rows))
     }
 
     /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is left once it is
@@ -253,6 +283,22 @@ impl Record {
     }
 }
 
+/// That the nominal robot, which nothing is better than, is off by more than robots are.
+fn of_nominal(figures: &PointSpread) -> Option<Finding> {
+    let (mean, most) = size_mm(figures).filter(|(mean, _)| *mean > IMPLAUSIBLE_MM)?;
+    let said = format!(
+        "no model is better than the nominal robot, which is off by {mean:.1} mm on average and by {most:.1} mm at most, farther than robots are \
+         built: some rows are no readings, or robot file and rows do not belong together"
+    );
+    Some(Finding::new(said, "look at the rows that are farthest off, and mend or remove them"))
+}
+
+/// Mean and largest error: of points where there are any, else of distances.
+fn size_mm(figures: &PointSpread) -> Option<(f64, f64)> {
+    let spread = figures.point.as_ref().unwrap_or(&figures.distance);
+    Some((spread.mean_abs_mm?, spread.max_abs_mm?))
+}
+
 /// Several joints that did not move.
 fn still(set: &Dataset) -> Option<String> {
     let joints = constant_joints(set);
@@ -287,5 +333,57 @@ fn shortened(list: &[String]) -> String {
     match list.len() {
         0..=SAID => list.join("; "),
         n => format!("{}; and {} more", list[..SAID].join("; "), n - SAID),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::identify::examine::sessions::Along;
+    use crate::identify::synthetic::{self, planned, point};
+    use crate::measurements::Role;
+
+    /// The advice where so many of the verify rows are off by this, mm, each in its own direction.
+    fn advised(count: usize, by_mm: f64) -> Record {
+        let mut world = planned(60, 30, 25.0, 0.02, 5, &|_| {});
+        let verify = world.rows.iter_mut().filter(|row| row.at.role == Role::Verify);
+        for (k, row) in verify.enumerate().take(count) {
+            let t = k as f64;
+            *point(row) += by_mm * Vector3::new(t.sin(), t.cos(), 0.5);
+        }
+        let (set, found) = world.identified(&world.rows);
+        let along = Along::default();
+        let findings = Findings::new(Vec::new(), (Vec::new(), None), Vec::new(), &along, &set, &found);
+        Record::new(&set, &world.nominal, &found, &along, findings, &synthetic::settings(), 1)
+    }
+
+    #[test]
+    fn verify_rows_that_are_far_off_speak_against_the_result() {
+        assert_eq!(advised(0, 0.0).advice, Advice::Use);
+        // One is a stray.
+        assert_eq!(advised(1, 300.0).advice, Advice::Check);
+        for by_mm in [10.0, 100.0, 3000.0] {
+            let record = advised(8, by_mm);
+            assert_eq!(record.advice, Advice::DoNotUse, "{by_mm}: {:?}", record.warnings);
+            assert!(record.reason.starts_with("the verify rows are off by"), "{}", record.reason);
+        }
+    }
+
+    #[test]
+    fn a_nominal_robot_that_is_kept_and_far_off_is_named() {
+        let of = |errors: &[f64]| PointSpread {
+            distance: Spread::new(errors.iter().copied()),
+            point: Some(Spread::new(errors.iter().copied())),
+            consistency: None,
+            distortion: None,
+        };
+        assert_eq!(of_nominal(&of(&[1.0, 2.0, 8.0])), None);
+        assert_eq!(of_nominal(&of(&[1.0, 2.0, 50.0])), None);
+        for far in [150.0, 3000.0] {
+            let said = of_nominal(&of(&[2.0, 3.0, far])).unwrap().sentence();
+            assert!(said.contains("farther than robots are built"), "{said}");
+        }
     }
 }

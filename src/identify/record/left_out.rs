@@ -199,7 +199,8 @@ fn along(of: &Rows, errors: &dyn Fn(&Dataset) -> Vec<RowError>) -> Option<Findin
         let shares: Vec<f64> = here.iter().zip(&motion).map(share).filter(|share| share.is_finite()).collect();
         let amounts: Vec<(f64, f64)> =
             here.iter().zip(&motion).map(|(e, d)| (e.dot(d) / d.norm_squared(), d.norm_squared())).collect();
-        (shares.len() == here.len()).then(|| (mean(&shares), joint, by_cosines(&shares), amounts))
+        let explained = shares.iter().sum::<f64>() / shares.len() as f64;
+        (shares.len() == here.len()).then(|| (explained, joint, by_cosines(&shares), amounts))
     };
     let joints = of.set.joint_count();
     let best = (0..joints).filter_map(of_joint).max_by(|a, b| a.0.total_cmp(&b.0));
@@ -230,10 +231,6 @@ fn every(left_out: usize, all: usize) -> &'static str {
 
 fn among(left_out: usize, all: usize) -> String {
     if left_out == all { left_out.to_string() } else { format!("{left_out} of {all}") }
-}
-
-fn mean(numbers: &[f64]) -> f64 {
-    numbers.iter().sum::<f64>() / numbers.len() as f64
 }
 
 fn finding(set: &Dataset, said: String, joint: usize, mut rows: Vec<usize>) -> Finding {

@@ -1,7 +1,6 @@
 //! `identification.json`: what was found, in numbers for other programs, and whether to use it.
 
 mod advice;
-mod far;
 mod file;
 pub mod findings;
 mod gather;

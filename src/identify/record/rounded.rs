@@ -63,7 +63,7 @@ pub fn as_closely_as_digits(set: &Dataset, found: &Identification) -> Option<Str
         return None;
     }
     let left_mm = found.scatter.point_mm.hypot(Smooth::new(found).map_or(0.0, |smooth| smooth.left_mm));
-    let (joints, points) = (joints_deg(set), points_mm(set));
+    let (joints, points) = (joints_deg(set), Steps::of(&coordinates_mm(set), "mm", 1.0));
     let of_points_mm = points.as_ref().map_or(0.0, |steps| of_coordinates_mm(set, steps));
     let of_both_mm = of_points_mm.hypot(joints.as_ref().map_or(0.0, |steps| of_joints_mm(set, found, steps)));
     // What rounds a joint moves the three coordinates of its row at once: a row counts as one number.
@@ -164,10 +164,9 @@ fn joints_deg(set: &Dataset) -> Option<Steps> {
     Steps::of(&angles, "deg", 1.0).or_else(|| Steps::of(&angles, "rad", 1f64.to_degrees()))
 }
 
-/// The steps that all points stand on.
-fn points_mm(set: &Dataset) -> Option<Steps> {
+fn coordinates_mm(set: &Dataset) -> Vec<f64> {
     let points = set.poses.iter().filter_map(|pose| pose.reading.point_mm());
-    Steps::of(&points.flat_map(|point| <[f64; 3]>::from(point.coords)).collect::<Vec<f64>>(), "mm", 1.0)
+    points.flat_map(|point| <[f64; 3]>::from(point.coords)).collect()
 }
 
 fn step(numbers: &[f64]) -> Option<f64> {
@@ -177,9 +176,7 @@ fn step(numbers: &[f64]) -> Option<f64> {
 
 /// What coordinates rounded to these steps scatter by, mm.
 fn of_coordinates_mm(set: &Dataset, steps: &Steps) -> f64 {
-    let points = set.poses.iter().filter_map(|pose| pose.reading.point_mm());
-    let variances: Vec<f64> =
-        points.flat_map(|point| <[f64; 3]>::from(point.coords)).map(|x| steps.variance(x)).collect();
+    let variances: Vec<f64> = coordinates_mm(set).into_iter().map(|x| steps.variance(x)).collect();
     (variances.iter().sum::<f64>() / variances.len().max(1) as f64).sqrt()
 }
 

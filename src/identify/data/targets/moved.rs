@@ -56,12 +56,11 @@ pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
             }
         }
     }
-    let most = |(_, a): (usize, (i32, f64, usize)), (_, b): (usize, (i32, f64, usize))| {
+    let order = |a: &(i32, f64, usize), b: &(i32, f64, usize)| {
         (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal)
     };
     let steps = |target: &usize| of_target[*target].0;
-    let (target, &(most_steps, _, from)) =
-        of_target.iter().enumerate().max_by(|a, b| most((a.0, *a.1), (b.0, *b.1)))?;
+    let (target, &(most_steps, _, from)) = of_target.iter().enumerate().max_by(|a, b| order(a.1, b.1))?;
     let rival = (0..targets).find(|other| *other != target && steps(other) == most_steps);
     // Which of two it was, their distances to the others tell at the pose that is known now.
     let clear = |of: usize, rival: usize| {

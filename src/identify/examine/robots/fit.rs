@@ -209,24 +209,6 @@ impl Points {
         weights: &[f64],
         scatter_mm: f64,
     ) -> (Left, DVector<f64>) {
-        let count = x.len();
-        let (normal, mut left) = self.normals(parts, kinematics, x, weights);
-        let measured = normal.view((0, 0), (count, count)).into_owned();
-        let prior = self.prior(parts.len() + self.further_tools(), scatter_mm);
-        let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
-        left.taken = product(&inverse, &measured).trace();
-        let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
-        (left, step.column(0).into_owned())
-    }
-
-    /// Normal equations of all parts, and what is left there.
-    fn normals(
-        &self,
-        parts: &[Vec<usize>],
-        kinematics: &[Kinematics],
-        x: &DVector<f64>,
-        weights: &[f64],
-    ) -> (DMatrix<f64>, Left) {
         let (count, of_links) = (x.len(), self.parameters.len() - TARGET);
         let mut normal = DMatrix::zeros(count + 1, count + 1);
         let mut left = Left { squares: 0.0, numbers: 0.0, taken: 0.0, errors_mm: Vec::new() };
@@ -244,7 +226,12 @@ impl Points {
             left.errors_mm.extend(errors_mm);
         }
         left.squares = normal[(count, count)];
-        (normal, left)
+        let measured = normal.view((0, 0), (count, count)).into_owned();
+        let prior = self.prior(parts.len() + self.further_tools(), scatter_mm);
+        let inverse = pseudo_inverse(&measured + DMatrix::from_diagonal(&prior));
+        left.taken = product(&inverse, &measured).trace();
+        let step = &inverse * (normal.view((0, count), (count, 1)) - prior.component_mul(x));
+        (left, step.column(0).into_owned())
     }
 
     /// One robot for these rows with common placements, where each row's target is taken by the load if it is under it, and how far that is, mm.

@@ -115,7 +115,10 @@ fn a_row_that_alone_contradicts_the_others_is_named_and_left_out() {
     let (truth, mut four) = rows(4, 0.02, false, 20);
     synthetic::point(&mut four[1]).x += 4.0;
     let fit = locate(&Dataset::new(&four).unwrap(), &truth, EXACT, None, &Settings::default()).unwrap().fit;
-    assert!(fit.stray.is_none() && (fit.freedom > 3 || fit.objection().unwrap().contains("are too few")), "{fit:?}");
+    assert!(
+        fit.stray.is_none() && (fit.misfit.freedom > 3 || fit.objection().unwrap().contains("are too few")),
+        "{fit:?}"
+    );
 }
 
 /// An instrument about which nothing is stated may be as coarse as it is: only what a robot's geometry explains beyond that speaks against the robot.

@@ -84,8 +84,12 @@ impl Compared<'_> {
         self.look((nuisance, all))
     }
 
-    fn look(&self, rows: (DMatrix<f64>, DMatrix<f64>)) -> Option<Look> {
-        let (off, columns) = left_over(rows);
+    /// At rows with the columns of the offsets, in coordinates that the placements and the target's turn do not reach.
+    fn look(&self, (nuisance, mut all): (DMatrix<f64>, DMatrix<f64>)) -> Option<Look> {
+        let taken = nuisance.ncols();
+        nuisance.qr().q_tr_mul(&mut all);
+        let rest = all.rows(taken, all.nrows().saturating_sub(taken));
+        let (off, columns) = (rest.column(0).into_owned(), rest.columns(1, all.ncols() - 1).into_owned());
         let known: Vec<usize> = (0..self.before.parameters.len()).collect();
         let of_old = columns.select_columns(&known) * root(&self.before.covariance);
         let difference = Difference::of_white(off, of_old, self.before.freedom)?;
@@ -209,15 +213,6 @@ fn stacked(linear: &Linearised, count: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         row += rows;
     }
     (nuisance, all)
-}
-
-/// White residuals and the columns of the offsets, in coordinates that the placements and the target's turn do not reach.
-fn left_over((nuisance, mut all): (DMatrix<f64>, DMatrix<f64>)) -> (DVector<f64>, DMatrix<f64>) {
-    let (total, count) = (all.nrows(), all.ncols() - 1);
-    let taken = nuisance.ncols();
-    nuisance.qr().q_tr_mul(&mut all);
-    let rest = all.rows(taken, total.saturating_sub(taken)).into_owned();
-    (rest.column(0).into_owned(), rest.columns(1, count).into_owned())
 }
 
 /// Residuals somewhere, with what they are known to, and the columns of all offsets there, white.

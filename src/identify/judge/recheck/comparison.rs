@@ -31,11 +31,6 @@ pub(super) struct Said {
 }
 
 impl Comparison<'_> {
-    /// Numbers that a row tells.
-    pub(super) fn numbers_of_row(&self) -> usize {
-        if self.oriented { 6 } else { 3 }
-    }
-
     /// Calls `with` with these rows beside the old robot.
     fn compared<T>(&self, used: &[usize], with: impl FnOnce(&Compared) -> T) -> T {
         let rows = rows(self.set, self.robot, &self.parameters, used, self.oriented, self.before.trust);

@@ -8,7 +8,6 @@
 //! Rows that fit far worse than the rest are named and left out; readings that only scatter more are said to.
 //! Goes wrong: what a placement takes up (the first joint's zero) is only seen as a sensor that moved; two joints at once are a cause unknown.
 
-mod along;
 mod compared;
 mod comparison;
 mod found;
@@ -20,9 +19,8 @@ mod suspects;
 #[cfg(test)]
 mod tests;
 
-pub use along::variances_along;
 pub use found::{Before, CauseSeen, Moved, Recheck, Stood};
-pub use suspects::zero;
+pub use suspects::{variances_along, zero};
 
 use self::comparison::Comparison;
 use crate::identify::Error;

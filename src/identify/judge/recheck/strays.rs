@@ -22,7 +22,7 @@ pub(super) fn left_out(comparison: &Comparison, used: &[usize], whole: &Said) ->
     if !whole.recheck.changed {
         return None;
     }
-    let (numbers, chance) = (comparison.numbers_of_row(), FALSE_ALARM / used.len() as f64);
+    let (numbers, chance) = (if comparison.oriented { 6 } else { 3 }, FALSE_ALARM / used.len() as f64);
     let (mut rest, mut strays) = (used.to_vec(), Vec::new());
     let mut left = whole.difference.chi_square();
     for _ in 0..used.len() / SHARE {
