@@ -89,7 +89,7 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
     let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
     let reads: Vec<Read> = reads.iter().filter(|read| read.marker.inverted == inverted).copied().collect();
     let found: Vec<(Placement, usize)> =
-        board.layouts().into_iter().filter_map(|layout| by_layout(board, layout, size, &reads, inverted)).collect();
+        board.layouts().into_iter().filter_map(|layout| by_layout(board, layout, size, &reads)).collect();
     match found[..] {
         [] => Said::Nothing,
         [(only, _)] => Said::Place(only),
@@ -100,14 +100,9 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
     }
 }
 
-/// The same for one layout, with the number of markers all of whose bits are right.
-fn by_layout(
-    board: &Board,
-    layout: Layout,
-    size: (usize, usize),
-    reads: &[Read],
-    inverted: bool,
-) -> Option<(Placement, usize)> {
+/// The same for one layout and markers of one colour, with the number of markers all of whose bits are right.
+fn by_layout(board: &Board, layout: Layout, size: (usize, usize), reads: &[Read]) -> Option<(Placement, usize)> {
+    let inverted = reads.first()?.marker.inverted;
     let mut best: Option<(Placement, usize)> = None;
     let mut rival = 0;
     for quarters in 0..4 {

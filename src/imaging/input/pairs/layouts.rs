@@ -2,9 +2,7 @@
 //!
 //! Patterns are those of [`expanded`]. Cut short where a form goes on in the same way.
 
-use camino::Utf8Path;
-
-use super::tests::{expanded, folder, read};
+use super::tests::{expanded, folder, outcome};
 use super::{PairBy, Pairing};
 
 /// Three lines each: repository and folder; the files; what comes of it, as [`told`] says it or, of a refusal, words of it, two blanks apart. The last
@@ -120,11 +118,6 @@ tjresearch/research-aneesh_sai: calib_images
 sebastiengilbert73/tutorial_calibrate_stereo_vision: red_square_images, one folder a camera
     camera_1/2023-01-02_{165050.931152,165050.993401,165051.063160}.png camera_2/2023-01-02_{165050.940113,165051.001270,165051.070007}.png
     --pair-by order`";
-
-/// The folder read, or the refusal with the folder's own path taken out.
-fn outcome(path: &Utf8Path, by: Option<PairBy>) -> Result<Pairing, String> {
-    read(path, by).map_err(|e| crate::diagnostic::report(&e).replace(path.as_str(), "IMAGES"))
-}
 
 /// So many pairs, the name of the first and of the last, and what is said of the left pictures.
 fn told(found: &Pairing) -> String {

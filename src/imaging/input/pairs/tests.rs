@@ -4,7 +4,6 @@ use camino::{Utf8Path, Utf8PathBuf};
 
 use super::{PairBy, Pairing, Source};
 use crate::files::temporary_folder;
-use crate::imaging::Result;
 
 /// All names that patterns stand for: `{1,2}` for each of a list, `{1..9}` for each number of a range, `␣` for a blank. Patterns are a blank apart.
 pub fn expanded(patterns: &str) -> Vec<String> {
@@ -37,14 +36,15 @@ pub fn folder(names: &[String]) -> (tempfile::TempDir, Utf8PathBuf) {
     (keep, path)
 }
 
-/// The folder read by itself.
-pub fn read(path: &Utf8Path, by: Option<PairBy>) -> Result<Pairing> {
-    Source { by, ..Source::folder("camera-check", path) }.whole_pictures()
+/// The folder read by itself, or the refusal with the folder's own path taken out.
+pub fn outcome(path: &Utf8Path, by: Option<PairBy>) -> Result<Pairing, String> {
+    let found = Source { by, ..Source::folder("camera-check", path) }.whole_pictures();
+    found.map_err(|e| crate::diagnostic::report(&e).replace(path.as_str(), "IMAGES"))
 }
 
 fn pairing(of: &str) -> Pairing {
     let (_keep, path) = folder(&expanded(of));
-    read(&path, None).unwrap_or_else(|e| panic!("{of}: {}", crate::diagnostic::report(&e)))
+    outcome(&path, None).unwrap_or_else(|said| panic!("{of}: {said}"))
 }
 
 /// The names of the pairs, a blank apart.
@@ -52,11 +52,9 @@ fn names(of: &str) -> String {
     pairing(of).pairs.iter().map(|p| p.pair.as_str()).collect::<Vec<_>>().join(" ")
 }
 
-/// The refusal, with the folder's own path taken out.
 fn complaint(of: &str, by: Option<PairBy>) -> String {
     let (_keep, path) = folder(&expanded(of));
-    let said = read(&path, by).map(|p| p.taken).unwrap_err();
-    crate::diagnostic::report(&said).replace(path.as_str(), "IMAGES")
+    outcome(&path, by).map(|found| found.taken).unwrap_err()
 }
 
 #[test]
@@ -152,7 +150,7 @@ fn numbers_pair_where_names_do_not() {
     let said = complaint(stamps, None);
     assert!(said.contains("no pair found: 4 pictures") && said.contains("IMAGES --pair-by order`"), "{said}");
     let (_keep, path) = folder(&expanded(stamps));
-    let ordered = read(&path, Some(PairBy::Order)).unwrap();
+    let ordered = outcome(&path, Some(PairBy::Order)).unwrap();
     assert_eq!(ordered.pairs[1].right.file_name(), Some("WIN_20210304_11_24_33_Pro.jpg"));
     assert_eq!(ordered.taken.split(':').next(), Some("2 pairs by order"));
 }
@@ -162,12 +160,12 @@ fn a_second_naming_pairs_what_the_first_leaves_over() {
     let series = "cam0/image0_{0..8}.png cam1/image1_{0..8}.png";
     let (_keep, path) = folder(&expanded(&format!("{series} cam0/{{2,3,Image1}}.bmp cam1/{{2,8}}.bmp")));
     for by in [None, Some(PairBy::Number)] {
-        let found = read(&path, by).unwrap();
+        let found = outcome(&path, by).unwrap();
         assert_eq!((found.pairs.len(), found.pairs[0].pair.as_str()), (10, "2"), "{found:?}");
         assert_eq!(found.taken.split(':').next(), Some("10 pairs by number"));
         assert_eq!(found.left_out().unwrap(), "left out: 3 pictures without a partner (Image1.bmp, 3.bmp, 8.bmp)");
     }
-    let by_name = read(&path, Some(PairBy::Name)).unwrap();
+    let by_name = outcome(&path, Some(PairBy::Name)).unwrap();
     assert_eq!((by_name.pairs.len(), by_name.single.len()), (1, 21));
     // Names that pair most come before numbers, which pair what these leave over.
     let both = pairing("{a,b}/p{1,2,3}.png a/x0_{7,8}.png b/x1_{7,8}.png");
@@ -234,10 +232,10 @@ fn folders_without_pairs_say_what_they_hold() {
         assert!(words.split("  ").all(|word| said.contains(word)), "{files}: {said}");
     }
     let (_keep, empty) = folder(&[]);
-    let nothing = crate::diagnostic::report(&read(&empty, None).unwrap_err());
+    let nothing = outcome(&empty, None).unwrap_err();
     assert!(nothing.contains("there are no pictures here"), "{nothing}");
-    let missing = crate::diagnostic::report(&read(Utf8Path::new("/no/such/folder"), None).unwrap_err());
-    assert!(missing.contains("not found") && missing.contains("/no/such/folder"), "{missing}");
+    let missing = outcome(Utf8Path::new("/no/such/folder"), None).unwrap_err();
+    assert!(missing.contains("not found") && missing.contains("in: IMAGES"), "{missing}");
 }
 
 #[test]
@@ -251,8 +249,7 @@ fn pictures_of_one_camera_are_no_pairs() {
         "leftover_{1,2}.png bright_{1,2}.png",
     ] {
         let (_keep, path) = folder(&expanded(files));
-        let found = read(&path, None);
-        assert!(found.is_err(), "{files}: {}", found.unwrap().taken);
+        assert!(outcome(&path, None).is_err(), "{files}");
     }
 }
 
