@@ -14,23 +14,15 @@ pub enum Side {
 }
 
 impl Side {
-    /// Both, left first.
     pub const BOTH: [Side; 2] = [Side::Left, Side::Right];
 
-    /// The other one.
     pub fn other(self) -> Side {
-        match self {
-            Side::Left => Side::Right,
-            Side::Right => Side::Left,
-        }
+        Side::BOTH[1 - self as usize]
     }
 
     /// The word in files and messages.
     pub fn name(self) -> &'static str {
-        match self {
-            Side::Left => "left",
-            Side::Right => "right",
-        }
+        ["left", "right"][self as usize]
     }
 }
 
@@ -66,9 +58,7 @@ impl Corner {
 pub struct PairCorners {
     /// Name of the pair: the pictures' common stem.
     pub pair: String,
-    /// Corners in the left picture.
     pub left: Vec<Corner>,
-    /// Corners in the right picture.
     pub right: Vec<Corner>,
 }
 
@@ -118,7 +108,6 @@ pub fn reasons(skipped: &[Skipped]) -> String {
 /// A pair at least one of whose pictures leaves its numbers open.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OpenPair {
-    /// Its name.
     pub pair: String,
     /// The corners of its left and of its right picture, once for each way of numbering them.
     pub sides: [Vec<Vec<Corner>>; 2],
@@ -137,7 +126,6 @@ pub struct Corners {
     pub right_size: (u32, u32),
     /// Pairs in which the board was found in both pictures, sorted by name.
     pub pairs: Vec<PairCorners>,
-    /// Pairs that were not used.
     pub skipped: Vec<Skipped>,
     /// Those of them that could be if it were known which of the board's corners they show.
     pub open: Vec<OpenPair>,

@@ -74,29 +74,24 @@ fn decided(counts: &Counts, of: usize, ends: bool) -> Option<Counted> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn pictures_that_contradict_each_other_decide_nothing() {
-        let of = |counts: &[((usize, usize), usize)]| {
-            decided(&counts.iter().copied().collect(), 20, true)
-                .map(|counted| (counted.squares.to_string(), counted.pictures))
-        };
-        assert_eq!(of(&[((9, 7), 12)]), Some(("9x7".to_owned(), 12)));
-        assert_eq!(of(&[((9, 7), 10), ((5, 4), 1)]), Some(("9x7".to_owned(), 10)));
-        assert_eq!(of(&[((9, 7), 9), ((5, 4), 1)]), None);
-        assert_eq!(of(&[((9, 7), 6), ((8, 7), 6)]), None);
-        assert_eq!(of(&[((9, 7), 1)]), None);
-        assert_eq!(of(&[]), None);
+    fn of(counts: &[((usize, usize), usize)], ends: bool) -> Option<(String, usize)> {
+        let counted = decided(&counts.iter().copied().collect(), 20, ends)?;
+        Some((counted.squares.to_string(), counted.pictures))
     }
 
     #[test]
-    fn boards_without_a_margin_are_counted_where_hardly_any_picture_shows_more() {
-        let of = |counts: &[((usize, usize), usize)]| {
-            decided(&counts.iter().copied().collect(), 20, false).map(|counted| counted.squares.to_string())
-        };
-        assert_eq!(of(&[((10, 7), 8), ((9, 7), 4), ((8, 7), 1)]), Some("10x7".to_owned()));
+    fn pictures_that_contradict_each_other_decide_nothing() {
+        assert_eq!(of(&[((9, 7), 12)], true), Some(("9x7".to_owned(), 12)));
+        assert_eq!(of(&[((9, 7), 10), ((5, 4), 1)], true), Some(("9x7".to_owned(), 10)));
+        assert_eq!(of(&[((9, 7), 9), ((5, 4), 1)], true), None);
+        assert_eq!(of(&[((9, 7), 6), ((8, 7), 6)], true), None);
+        assert_eq!(of(&[((9, 7), 1)], true), None);
+        assert_eq!(of(&[], true), None);
+        // Boards without a margin are counted where hardly any picture shows more.
+        assert_eq!(of(&[((10, 7), 8), ((9, 7), 4), ((8, 7), 1)], false), Some(("10x7".to_owned(), 8)));
         // Hidden in most: the larger count is the board's, and is not told from a chance find.
-        assert_eq!(of(&[((9, 7), 12), ((10, 7), 2)]), None);
-        assert_eq!(of(&[((9, 7), 5), ((8, 7), 5)]), None);
-        assert_eq!(of(&[((9, 7), 1)]), None);
+        assert_eq!(of(&[((9, 7), 12), ((10, 7), 2)], false), None);
+        assert_eq!(of(&[((9, 7), 5), ((8, 7), 5)], false), None);
+        assert_eq!(of(&[((9, 7), 1)], false), None);
     }
 }

@@ -21,20 +21,13 @@ pub enum Error {
     Board(#[from] board::Error),
     /// The folder is not there.
     #[error("folder not found")]
-    NoFolder {
-        /// The folder.
-        path: Utf8PathBuf,
-    },
+    NoFolder { path: Utf8PathBuf },
     /// A file where a folder was needed.
     #[error("a folder of pictures is needed, this is a file")]
-    NotAFolder {
-        /// The file.
-        path: Utf8PathBuf,
-    },
+    NotAFolder { path: Utf8PathBuf },
     /// A second place that is no folder of the right camera's pictures.
     #[error("{}", if *.found { "a folder of the right camera's pictures is needed, this is a file" } else { "folder not found" })]
     NotRight {
-        /// What was named.
         path: Utf8PathBuf,
         /// Whether there is something of that name.
         found: bool,
@@ -42,7 +35,6 @@ pub enum Error {
     /// Pictures, perhaps, but not which left one belongs to which right one.
     #[error("{statement}")]
     Unpaired {
-        /// The folder.
         path: Utf8PathBuf,
         /// What was found.
         statement: String,
@@ -52,7 +44,6 @@ pub enum Error {
     /// A picture that cannot be cut into two equal halves.
     #[error("the picture is {px} px {}, which are no two equal halves", .way.0)]
     NoHalves {
-        /// The picture.
         path: Utf8PathBuf,
         /// Its width or height, px.
         px: usize,
@@ -61,17 +52,10 @@ pub enum Error {
     },
     /// Two files that would be the same picture of the same pair.
     #[error("two pictures claim the same side of pair `{pair}`: {first} and {second}")]
-    SameName {
-        pair: String,
-        /// One file.
-        first: Utf8PathBuf,
-        /// The other.
-        second: Utf8PathBuf,
-    },
+    SameName { pair: String, first: Utf8PathBuf, second: Utf8PathBuf },
     /// Not one pair of pictures could be read.
     #[error("not one pair of pictures can be read{}", reasons(.skipped))]
     NoneReadable {
-        /// The folder.
         path: Utf8PathBuf,
         /// The pairs, and why.
         skipped: Vec<Skipped>,
@@ -79,7 +63,6 @@ pub enum Error {
     /// The pictures do not tell how many squares the board has.
     #[error("the board's squares cannot be counted: {}", tally(.counts, *.of))]
     NotCounted {
-        /// The folder.
         path: Utf8PathBuf,
         /// Columns and rows of whole boards that were seen, and in how many pictures.
         counts: Vec<((usize, usize), usize)>,
@@ -95,11 +78,9 @@ pub enum Error {
         total: usize,
         /// The others of the folder: those searched leave no doubt of them.
         not_searched: usize,
-        /// Pairs needed.
         needed: usize,
         /// The board that was looked for; boxed, for errors are returned everywhere.
         board: Box<Board>,
-        /// The folder.
         path: Utf8PathBuf,
         /// The others, and why.
         skipped: Vec<Skipped>,

@@ -29,7 +29,6 @@ use crate::progress;
 /// What is looked for.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// The board.
     pub board: Board,
     /// The least number of pairs that is of use.
     pub needed: usize,

@@ -8,9 +8,7 @@ use crate::statistics::median;
 /// Corners (or anything that belongs to one) by column and row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice<T> {
-    /// Number of columns.
     pub columns: usize,
-    /// Number of rows.
     pub rows: usize,
     /// Row by row; `None` where the corner is missing.
     pub cells: Vec<Option<T>>,
@@ -22,28 +20,27 @@ pub type Places = Lattice<Point2<f64>>;
 impl Places {
     /// The median distance of neighbours along the rows and the columns, px; `None` without neighbours.
     pub fn step_px(&self) -> Option<f64> {
-        median(self.steps_px())
+        self.side_px(Pitch::Even)
     }
 
     /// The median side of a square, px, by the distances of neighbours on a board whose lines follow one another like this; `None` without neighbours.
     pub fn side_px(&self, pitch: Pitch) -> Option<f64> {
-        let to = |line: usize, p: &Point2<f64>, next: Option<&Point2<f64>>| {
-            next.map(|next| (next - p).norm() / pitch.after(line as isize))
-        };
-        let both = |(col, row, p): (usize, usize, &Point2<f64>)| {
-            [to(col, p, self.get(col + 1, row)), to(row, p, self.get(col, row + 1))]
-        };
-        median(self.iter().flat_map(both).flatten())
+        median(self.sides_px(pitch))
     }
 
     /// The least distance of neighbours, px; `None` without neighbours.
     pub fn least_step_px(&self) -> Option<f64> {
-        self.steps_px().min_by(f64::total_cmp)
+        self.sides_px(Pitch::Even).min_by(f64::total_cmp)
     }
 
-    fn steps_px(&self) -> impl Iterator<Item = f64> + '_ {
-        let to = |col: usize, row: usize, p: &Point2<f64>| self.get(col, row).map(|next| (next - p).norm());
-        self.iter().flat_map(move |(col, row, p)| [to(col + 1, row, p), to(col, row + 1, p)]).flatten()
+    fn sides_px(&self, pitch: Pitch) -> impl Iterator<Item = f64> + '_ {
+        let to = move |line: usize, p: &Point2<f64>, next: Option<&Point2<f64>>| {
+            next.map(|next| (next - p).norm() / pitch.after(line as isize))
+        };
+        let both = move |(col, row, p): (usize, usize, &Point2<f64>)| {
+            [to(col, p, self.get(col + 1, row)), to(row, p, self.get(col, row + 1))]
+        };
+        self.iter().flat_map(both).flatten()
     }
 
     /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two or three corners
@@ -142,6 +139,16 @@ impl<T: Clone> Lattice<T> {
     }
 }
 
+/// The place that a column and a row have after so many quarter turns, from the columns' direction to the rows', of a grid that ends at `last`.
+pub fn turned_place((col, row): (isize, isize), last: (isize, isize), quarters: usize) -> (isize, isize) {
+    match quarters % 4 {
+        0 => (col, row),
+        1 => (last.1 - row, col),
+        2 => (last.0 - col, last.1 - row),
+        _ => (row, last.0 - col),
+    }
+}
+
 /// Another numbering of the same corners: turned about corner (0, 0) by so many quarter turns, then moved by columns and rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Renumbering {
@@ -167,13 +174,7 @@ impl Renumbering {
 
     /// The numbers of what had these.
     pub fn of(&self, col: usize, row: usize) -> (isize, isize) {
-        let (col, row) = (col as isize, row as isize);
-        let (x, y) = match self.quarters % 4 {
-            0 => (col, row),
-            1 => (-row, col),
-            2 => (-col, -row),
-            _ => (row, -col),
-        };
+        let (x, y) = turned_place((col as isize, row as isize), (0, 0), self.quarters);
         (x + self.columns, y + self.rows)
     }
 }

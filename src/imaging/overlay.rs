@@ -38,7 +38,8 @@ pub struct SideBySide {
 impl SideBySide {
     /// Reads both; `None` where a picture can't be read.
     pub fn read(files: &PairFiles, mosaic: Option<Mosaic>) -> Option<SideBySide> {
-        let (left, right) = rayon::join(|| small(&files.left, mosaic), || small(&files.right, mosaic));
+        let small = |path: &Utf8Path| Some(Small::coarse(&super::image::picture(path, mosaic).ok()?));
+        let (left, right) = rayon::join(|| small(&files.left), || small(&files.right));
         let (left, right) = (left?, right?);
         Some(SideBySide::new([&left, &right].map(|s| (grey(&s.copy), s.level.scale())), RING_PX))
     }
@@ -106,10 +107,6 @@ pub fn png(files: &PairFiles, corners: &PairCorners, mosaic: Option<Mosaic>) -> 
     let mut bytes = std::io::Cursor::new(Vec::new());
     drawn(files, corners, mosaic)?.image.write_to(&mut bytes, image::ImageFormat::Png).ok()?;
     Some(bytes.into_inner())
-}
-
-fn small(path: &Utf8Path, mosaic: Option<Mosaic>) -> Option<Small> {
-    Some(Small::coarse(&super::image::picture(path, mosaic).ok()?))
 }
 
 fn grey(copy: &Grey8) -> GrayImage {

@@ -9,6 +9,7 @@ use super::dictionary::Dictionary;
 use super::layout::Layout;
 use super::pitch::Pitch;
 use super::squares::Squares;
+use crate::imaging::lattice::turned_place;
 
 /// Sides of squares, mm: from a wafer's to a car park's.
 pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
@@ -54,7 +55,6 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(try_from = "String")]
 pub struct Board {
-    /// Number of squares.
     pub squares: Squares,
     /// Width of a square, of a grid of tags that of a tag, mm.
     pub square_mm: f64,
@@ -99,12 +99,8 @@ impl Board {
 
     /// The board with markers in these squares.
     pub fn with_layout(self, layout: Layout) -> Board {
-        match self.kind {
-            Kind::Checker | Kind::Tags { .. } => self,
-            Kind::Charuco { marker_mm, dictionary, .. } => {
-                Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
-            }
-        }
+        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return self };
+        Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
     }
 
     /// Says all that pictures of the board depend on; lengths only as ratios.
@@ -204,12 +200,7 @@ impl Board {
         match self.kind {
             Kind::Checker | Kind::Charuco { .. } => self.index(col, row),
             Kind::Tags { .. } => {
-                let corner = match (col % 2, row % 2) {
-                    (0, 1) => 0,
-                    (1, 1) => 1,
-                    (1, 0) => 2,
-                    _ => 3,
-                };
+                let corner = [[3, 2], [0, 1]][row % 2][col % 2];
                 4 * Layout::Tags.number(self.squares, col / 2 * 2 + 1, row / 2 * 2 + 1) + corner
             }
         }
@@ -261,24 +252,16 @@ impl Board {
     /// The place, column and row, that a corner has after the board was turned in its plane by so many quarter turns; a board with unequal sides
     /// takes half turns only.
     pub fn turned(&self, (col, row): (usize, usize), quarters: usize) -> (usize, usize) {
-        let (last_col, last_row) = (self.columns() - 1, self.rows() - 1);
-        match quarters % 4 {
-            0 => (col, row),
-            1 => (last_row - row, col),
-            2 => (last_col - col, last_row - row),
-            _ => (row, last_col - col),
-        }
+        let last = (self.columns() as isize - 1, self.rows() as isize - 1);
+        let (col, row) = turned_place((col as isize, row as isize), last, quarters);
+        (col as usize, row as usize)
     }
 
     /// Quarter turns after which the board's outline is the same, whatever its colours: all four of a square board, none and two of another;
     /// none but the first where every corner has a number of its own.
     pub fn turns_of_outline(&self) -> Vec<usize> {
-        let step = match (self.is_coded(), self.columns() == self.rows()) {
-            (true, _) => 4,
-            (false, true) => 1,
-            (false, false) => 2,
-        };
-        (0..4).step_by(step).collect()
+        let own_step = if self.columns() == self.rows() { 1 } else { 2 };
+        (0..4).step_by(if self.is_coded() { 4 } else { own_step }).collect()
     }
 }
 

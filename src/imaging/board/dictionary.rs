@@ -29,12 +29,11 @@ impl fmt::Debug for Dictionary {
 impl Dictionary {
     /// The dictionary of this name, in any case and with or without `DICT_`; or why there is none.
     pub fn named(text: &str) -> Result<Dictionary, String> {
-        let same = |name: &&&str| {
-            let short = name.strip_prefix("DICT_").unwrap_or(name);
-            text.eq_ignore_ascii_case(name) || text.eq_ignore_ascii_case(short)
+        let same = |known: &Dictionary| {
+            let short = known.name().strip_prefix("DICT_").unwrap_or(known.name());
+            text.eq_ignore_ascii_case(known.name()) || text.eq_ignore_ascii_case(short)
         };
-        let found = BUILTIN_DICTIONARY_NAMES.iter().find(same).and_then(|name| builtin_dictionary(name));
-        found.map(Dictionary).ok_or_else(|| {
+        Dictionary::all().find(same).ok_or_else(|| {
             format!("there is no dictionary `{text}`; there are {}", BUILTIN_DICTIONARY_NAMES.join(", "))
         })
     }
@@ -43,15 +42,12 @@ impl Dictionary {
     pub fn of_tags(text: &str) -> Result<Dictionary, String> {
         let lower = text.to_ascii_lowercase();
         let size = lower.strip_prefix("tag").or_else(|| lower.strip_prefix('t')).unwrap_or(&lower);
-        let known = |name: &&&str| {
-            let family = name.strip_prefix(TAGS);
-            family.is_some_and(|family| family.eq_ignore_ascii_case(size)) || text.eq_ignore_ascii_case(name)
+        let families = || Dictionary::all().filter(|known| known.name().starts_with(TAGS));
+        let same = |known: &Dictionary| {
+            text.eq_ignore_ascii_case(known.name()) || known.name()[TAGS.len()..].eq_ignore_ascii_case(size)
         };
-        let families = || BUILTIN_DICTIONARY_NAMES.iter().filter(|name| name.starts_with(TAGS));
-        let found = families().find(known).and_then(|name| builtin_dictionary(name)).map(Dictionary);
-        found.ok_or_else(|| {
-            let names: Vec<String> =
-                families().filter_map(|name| builtin_dictionary(name)).map(|d| Dictionary(d).tag_name()).collect();
+        families().find(same).ok_or_else(|| {
+            let names: Vec<String> = families().map(Dictionary::tag_name).collect();
             format!("there is no family of tags `{text}`; there are {}", names.join(", "))
         })
     }

@@ -2,30 +2,19 @@
 
 use crate::diagnostic::Explain;
 
-/// A board that was not understood.
+/// A board that was not understood; `found` is what was typed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A board's size was not understood.
     #[error("a board is given as COLUMNSxROWS squares, at least 3x3, got `{found}`")]
-    Size {
-        /// What was typed.
-        found: String,
-    },
+    Size { found: String },
     /// The counts of a grid of tags were not understood.
     #[error("a grid of tags is given as COLUMNSxROWS tags, at least 1x1, got `{found}`")]
-    TagCounts {
-        /// What was typed.
-        found: String,
-    },
+    TagCounts { found: String },
     /// A board's name was not understood.
     #[error("`{found}` names no board: {why}")]
-    Name {
-        /// What was typed.
-        found: String,
-        /// What is wrong with it.
-        why: String,
-    },
+    Name { found: String, why: String },
 }
 
 impl Explain for Error {

@@ -83,18 +83,10 @@ mod tests {
     fn markers_count_row_by_row() {
         for (columns, rows) in [(4, 5), (5, 4), (11, 8), (8, 11), (7, 7), (6, 6)] {
             for layout in [Layout::New, Layout::Old] {
-                let mut next = 0;
-                for y in 0..rows {
-                    for x in 0..columns {
-                        if layout.holds_marker(x as isize, y as isize) {
-                            assert_eq!(
-                                layout.number(Squares { columns, rows }, x, y),
-                                next,
-                                "{columns}x{rows} {layout:?} {x} {y}"
-                            );
-                            next += 1;
-                        }
-                    }
+                let squares = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+                let held = squares.filter(|(x, y)| layout.holds_marker(*x as isize, *y as isize));
+                for (next, (x, y)) in held.enumerate() {
+                    assert_eq!(layout.number(Squares { columns, rows }, x, y), next, "{columns}x{rows} {layout:?}");
                 }
             }
         }

@@ -83,17 +83,14 @@ impl PrintedExtent {
     fn of_another_scale(&self, board: &Board, scale: [f64; 2], and: &str) -> String {
         let scale = (scale[0] + scale[1]) / 2.0;
         let sides = |mm: f64| (mm * scale * 1e3).round() / 1e3;
+        let square = sides(board.square_mm);
         let given = match board.kind {
-            Kind::Checker => format!("`--squares {} --square-mm {}`", board.squares, sides(board.square_mm)),
+            Kind::Checker => format!("`--squares {} --square-mm {square}`", board.squares),
             Kind::Charuco { marker_mm, .. } => {
-                format!(
-                    "`--board` with squares of {} mm and markers of {} mm",
-                    sides(board.square_mm),
-                    sides(marker_mm)
-                )
+                format!("`--board` with squares of {square} mm and markers of {} mm", sides(marker_mm))
             }
             Kind::Tags { gap_mm, .. } => {
-                format!("`--board` with tags of {} mm and gaps of {} mm", sides(board.square_mm), sides(gap_mm))
+                format!("`--board` with tags of {square} mm and gaps of {} mm", sides(gap_mm))
             }
         };
         let ([width, height], percent) = (self.mm, 100.0 * (scale - 1.0));

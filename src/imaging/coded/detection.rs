@@ -120,10 +120,10 @@ fn parts_on(
         }
         for grid in grids_on(copy, board.pitch(), margin, foreshortened).take(MOST_GRIDS) {
             match number(picture, board, fields, &grid) {
-                Numbered::Part(part) => add(board, &mut parts, part)?,
-                Numbered::ByLayout => missed.by_layout = true,
-                Numbered::No if missed.unnumbered.len() < MOST_GRIDS => missed.unnumbered.push(grid),
-                Numbered::No => {}
+                Ok(part) => add(board, &mut parts, part)?,
+                Err(Said::ByLayout) => missed.by_layout = true,
+                Err(_) if missed.unnumbered.len() < MOST_GRIDS => missed.unnumbered.push(grid),
+                Err(_) => {}
             }
         }
     }
@@ -163,15 +163,8 @@ fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
     }
 }
 
-/// A grid with what its markers say.
-enum Numbered {
-    Part(Part),
-    ByLayout,
-    No,
-}
-
-/// A grid as a part of the board.
-fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) -> Numbered {
+/// A grid as a part of the board; else what its markers say.
+fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) -> Result<Part, Said> {
     let size = (grid.columns, grid.rows);
     let one_by_one = fields.iter().map(|fields| {
         let reads = markers_in(picture, grid, board.pitch(), *fields);
@@ -181,17 +174,17 @@ fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) ->
         fields.iter().map(|fields| (*fields, faint::place(board, size, &faint_in(picture, grid, board, *fields))));
     let (fields, placement) = match one_by_one.chain(together).find(|(_, said)| *said != Said::Nothing) {
         Some((fields, Said::Place(placement))) => (fields, placement),
-        Some((_, Said::ByLayout)) => return Numbered::ByLayout,
-        Some((_, Said::Nothing)) | None => return Numbered::No,
+        Some((_, said)) => return Err(said),
+        None => return Err(Said::Nothing),
     };
     let turned = grid.turned(placement.quarters);
     if goes_beyond(board, &turned, &placement) {
-        return Numbered::No;
+        return Err(Said::Nothing);
     }
     let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         turned.around(col as isize - placement.col, row as isize - placement.row).copied()
     });
-    if corners.count() > 0 { Numbered::Part(Part { corners, placement, fields }) } else { Numbered::No }
+    if corners.count() > 0 { Ok(Part { corners, placement, fields }) } else { Err(Said::Nothing) }
 }
 
 /// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its markers are in the other squares.

@@ -96,11 +96,8 @@ fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionar
         (Some((_, other, share)), Kind::Charuco { marker_mm, .. })
             if (share - own.share).abs() > 0.03 && other == dictionary =>
         {
-            format!(
-                "shows markers of about {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
-                share * board.square_mm,
-                board.square_mm
-            )
+            let (seen_mm, square_mm) = (share * board.square_mm, board.square_mm);
+            format!("shows markers of about {seen_mm:.3} mm in squares of {square_mm} mm; --board says {marker_mm} mm")
         }
         (Some((_, other, _)), _) if other != dictionary => {
             let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());

@@ -29,25 +29,18 @@ pub fn other_markers(
 ) -> Option<String> {
     let Kind::Charuco { marker_mm, .. } = board.kind else { return None };
     let share = seen_share(picture, merged, layout, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)?;
-    Some(format!(
-        "shows markers of {:.3} mm in squares of {} mm; --board says {marker_mm} mm",
-        share * board.square_mm,
-        board.square_mm
-    ))
+    let (seen_mm, square_mm) = (share * board.square_mm, board.square_mm);
+    Some(format!("shows markers of {seen_mm:.3} mm in squares of {square_mm} mm; --board says {marker_mm} mm"))
 }
 
 /// The width of the gaps between tags, where measured corners show it to be another than the board's name says.
 pub fn other_gaps(board: &Board, corners: &Places) -> Option<String> {
     let Kind::Tags { gap_mm, .. } = board.kind else { return None };
     let (gap, sigma) = seen_gap(corners)?;
-    let named = gap_mm / board.square_mm;
-    ((gap - named).abs() > (MOST_GAP_OFF * named).max(SURE * sigma)).then(|| {
-        format!(
-            "shows gaps of {:.3} mm between tags of {} mm; --board says {gap_mm} mm",
-            gap * board.square_mm,
-            board.square_mm
-        )
-    })
+    let (seen_mm, square_mm) = (gap * board.square_mm, board.square_mm);
+    let named = gap_mm / square_mm;
+    ((gap - named).abs() > (MOST_GAP_OFF * named).max(SURE * sigma))
+        .then(|| format!("shows gaps of {seen_mm:.3} mm between tags of {square_mm} mm; --board says {gap_mm} mm"))
 }
 
 /// Width of the gaps between tags as they are seen, in sides of a tag, and its standard deviation: from the cross-ratio of two tags' four corners on a

@@ -8,6 +8,7 @@
 use super::marker::Marker;
 use crate::imaging::board::dictionary::turned as quarter_turned;
 use crate::imaging::board::{Board, Kind, Layout};
+use crate::imaging::lattice::turned_place;
 
 /// A marker in a square of a grid: the square is the one after corner `(col, row)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,7 +17,6 @@ pub struct Read {
     pub col: isize,
     /// Row of the corner before it.
     pub row: isize,
-    /// What was read.
     pub marker: Marker,
 }
 
@@ -47,14 +47,8 @@ fn tolerated(bits: usize) -> usize {
 }
 
 /// A square, as it would be in a grid of `columns` x `rows` corners that is turned by so many quarter turns.
-pub fn turned_square((col, row): (isize, isize), (columns, rows): (usize, usize), quarters: usize) -> (isize, isize) {
-    let (columns, rows) = (columns as isize, rows as isize);
-    match quarters % 4 {
-        0 => (col, row),
-        1 => (rows - 2 - row, col),
-        2 => (columns - 2 - col, rows - 2 - row),
-        _ => (row, columns - 2 - col),
-    }
+pub fn turned_square(square: (isize, isize), (columns, rows): (usize, usize), quarters: usize) -> (isize, isize) {
+    turned_place(square, (columns as isize - 2, rows as isize - 2), quarters)
 }
 
 /// What was read, as it would be in such a grid.
@@ -95,7 +89,7 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
     let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
     let reads: Vec<Read> = reads.iter().filter(|read| read.marker.inverted == inverted).copied().collect();
     let found: Vec<(Placement, usize)> =
-        board.layouts().into_iter().filter_map(|layout| by_layout(board, layout, size, &reads, inverted)).collect();
+        board.layouts().into_iter().filter_map(|layout| by_layout(board, layout, size, &reads)).collect();
     match found[..] {
         [] => Said::Nothing,
         [(only, _)] => Said::Place(only),
@@ -106,14 +100,9 @@ pub fn place(board: &Board, size: (usize, usize), reads: &[Read]) -> Said {
     }
 }
 
-/// The same for one layout, with the number of markers all of whose bits are right.
-fn by_layout(
-    board: &Board,
-    layout: Layout,
-    size: (usize, usize),
-    reads: &[Read],
-    inverted: bool,
-) -> Option<(Placement, usize)> {
+/// The same for one layout and markers of one colour, with the number of markers all of whose bits are right.
+fn by_layout(board: &Board, layout: Layout, size: (usize, usize), reads: &[Read]) -> Option<(Placement, usize)> {
+    let inverted = reads.first()?.marker.inverted;
     let mut best: Option<(Placement, usize)> = None;
     let mut rival = 0;
     for quarters in 0..4 {
@@ -183,17 +172,13 @@ mod tests {
     ) -> ((usize, usize), Vec<Read>) {
         let Kind::Charuco { dictionary, .. } = board.kind else { panic!("a board with markers") };
         let size = (cols.len(), rows.len());
-        let mut reads = Vec::new();
-        for row in rows.start - 1..rows.end {
-            for col in cols.start - 1..cols.end {
-                let Some(id) = marker_in(board, layout, (col + 1, row + 1)) else { continue };
-                let code = dictionary.code(id).unwrap();
-                let marker = Marker { code, bits: dictionary.bits(), inverted: false, contrast: 100.0 };
-                let read = Read { col: col - cols.start, row: row - rows.start, marker };
-                reads.push(turned(&read, size, quarters));
-            }
-        }
-        (if quarters % 2 == 1 { (size.1, size.0) } else { size }, reads)
+        let squares = (rows.start - 1..rows.end).flat_map(|row| (cols.start - 1..cols.end).map(move |col| (col, row)));
+        let read = |(col, row)| {
+            let code = dictionary.code(marker_in(board, layout, (col + 1, row + 1))?).unwrap();
+            let marker = Marker { code, bits: dictionary.bits(), inverted: false, contrast: 100.0 };
+            Some(turned(&Read { col: col - cols.start, row: row - rows.start, marker }, size, quarters))
+        };
+        (if quarters % 2 == 1 { (size.1, size.0) } else { size }, squares.filter_map(read).collect())
     }
 
     #[test]

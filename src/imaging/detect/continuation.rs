@@ -186,12 +186,8 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_board_ends_where_its_corners_end() {
+    fn a_whole_board_ends_where_its_corners_end_and_a_part_goes_on_where_it_was_cut() {
         assert_eq!(lines_beyond(&found(0..6, 0..5)), (0, 0));
-    }
-
-    #[test]
-    fn a_part_goes_on_where_it_was_cut() {
         assert_eq!(lines_beyond(&found(0..5, 0..5)), (1, 0));
         assert_eq!(lines_beyond(&found(1..5, 0..5)), (2, 0));
         assert_eq!(lines_beyond(&found(1..6, 1..4)), (1, 2));

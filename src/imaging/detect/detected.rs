@@ -14,7 +14,6 @@ pub const LEAST_SEEN: usize = 12;
 pub struct Detected {
     /// Coarse places of the inner corners on the copy, px, to about half a pixel.
     pub corners: Places,
-    /// The reduced copy.
     pub copy: Grey8,
     /// Its size; never doubled.
     pub level: Level,

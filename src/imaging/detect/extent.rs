@@ -258,6 +258,8 @@ mod tests {
         for (at, count) in cases {
             assert_eq!(seen("10x6", at, |_, _| false), Some(count), "{at:?}");
         }
+        // A board in view needs nothing.
+        assert_eq!(seen("9x6", (20.0, 25.0), |_, _| false), Some(40));
     }
 
     #[test]
@@ -327,10 +329,5 @@ mod tests {
             None
         );
         assert_eq!(whole_without_sparse_line(&beside(3), Board::checker("9x7".parse().unwrap(), 25.0)), None);
-    }
-
-    #[test]
-    fn a_board_in_view_needs_nothing() {
-        assert_eq!(seen("9x6", (20.0, 25.0), |_, _| false), Some(40));
     }
 }

@@ -1,6 +1,5 @@
 //! Where the board is in a picture, to about a pixel of a small copy: grids of corners that grow, and what tells which part of the board they are.
 
-mod board;
 mod colour;
 pub mod continuation;
 pub mod count;
@@ -12,8 +11,7 @@ mod growth;
 mod plain;
 mod saddles;
 
-pub use board::detect;
 pub use colour::right_handed;
 pub use detected::{Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
 pub use growth::grids;
-pub use plain::size_seen;
+pub use plain::{detect, size_seen};

@@ -15,7 +15,7 @@ use super::{continuation, extent};
 use crate::imaging::image::pyramid::{Level, coarse_factor, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places, Renumbering};
-use crate::imaging::{Board, Squares};
+use crate::imaging::{Board, Squares, coded};
 use crate::opencv::find_board;
 
 /// How many times more of the board another copy must show to be worth more than the copy before it.
@@ -66,8 +66,15 @@ impl Search {
     }
 }
 
-/// Looks for the board; the reason where it was not found.
+/// Looks for the board that was asked for, plain or with markers; the reason where it was not found.
 pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    if board.is_coded() {
+        return coded::detect(picture, board);
+    }
+    detect_plain(picture, board).map_err(|refusal| coded::with_markers(picture).map_or(refusal, Refusal::from))
+}
+
+fn detect_plain(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     if let Some(detected) = at_a_glance(picture, board) {
         return Ok(detected);
     }
@@ -266,6 +273,13 @@ mod tests {
         image.into()
     }
 
+    /// How far a corner is from the nearest crossing at the most, px of the picture.
+    fn farthest(detected: &Detected, side: usize) -> f64 {
+        let off = |v: f64| ((v + 0.5) / side as f64 - ((v + 0.5) / side as f64).round()).abs() * side as f64;
+        let places = detected.corners.iter().map(|(_, _, place)| detected.level.to_picture(place));
+        places.map(|place| off(place.x).max(off(place.y))).fold(0.0, f64::max)
+    }
+
     #[test]
     fn large_squares_are_found_on_a_smaller_copy_than_small_ones() {
         let board = Board::checker("8x6".parse().unwrap(), 10.0);
@@ -273,11 +287,7 @@ mod tests {
         for (side, level) in [(170, glance), (48, glance), (40, first), (20, first)] {
             let detected = detect(&picture(2048, side), board).unwrap();
             assert_eq!((detected.level, detected.corners.count()), (level, 35), "{side}");
-            for (col, row, place) in detected.corners.iter() {
-                let place = (detected.level.to_picture(place).coords.add_scalar(0.5)) / side as f64;
-                let off = place.map(|v| (v - v.round()).abs() * side as f64);
-                assert!(off.max() <= level.scale(), "{side}: {col} {row} {place}");
-            }
+            assert!(farthest(&detected, side) <= level.scale(), "{side}");
         }
     }
 
@@ -295,10 +305,7 @@ mod tests {
             .into();
             let found = detect(&picture, board).unwrap();
             assert_eq!(found.corners.count(), 35, "{side} {bleeds}");
-            for (_, _, place) in found.corners.iter() {
-                let place = found.level.to_picture(place).coords.add_scalar(0.5) / side as f64;
-                assert!(place.map(|v| (v - v.round()).abs() * side as f64).max() < 1.5, "{place}");
-            }
+            assert!(farthest(&found, side) < 1.5, "{side} {bleeds}");
         }
     }
 

@@ -54,7 +54,6 @@ impl Value for u16 {
 /// A grey picture and the level at which it is clipped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Picture {
-    /// Its grey values.
     pub grey: Grey,
     clip_level: f64,
 }
@@ -77,12 +76,10 @@ impl Picture {
         self.clip_level
     }
 
-    /// Width, px.
     pub fn width(&self) -> usize {
         self.size().0
     }
 
-    /// Height, px.
     pub fn height(&self) -> usize {
         self.size().1
     }

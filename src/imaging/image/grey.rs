@@ -5,9 +5,7 @@ use nalgebra::Point2;
 /// Values row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Image<T> {
-    /// Width, px.
     pub width: usize,
-    /// Height, px.
     pub height: usize,
     /// Its `width * height` values.
     pub pixels: Vec<T>,
@@ -19,7 +17,6 @@ pub type Grey8 = Image<u8>;
 /// Grey values as the camera gave them.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Grey {
-    /// 8 bits a pixel.
     Eight(Image<u8>),
     /// 16 bits a pixel, of which a camera may use fewer.
     Sixteen(Image<u16>),

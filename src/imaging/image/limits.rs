@@ -10,8 +10,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 use camino::Utf8Path;
 use image::error::ImageFormatHint;
 use image::{ImageDecoder, ImageFormat, ImageReader, Limits};
-
-use super::pages::pages;
+use tiff::decoder::Decoder;
+use tiff::tags::Tag;
 
 /// What every reason for a file that is no picture says.
 pub const UNDECODABLE: &str = "cannot be decoded";
@@ -26,13 +26,15 @@ const MOST_DECODED_BYTES: u64 = 1 << 30;
 const MOST_FILE_BYTES: u64 = MOST_DECODED_BYTES + (64 << 20);
 /// Bytes that all workers together may hold for pictures. One picture is always let in.
 const MOST_HELD_BYTES: u64 = 3 << 30;
+/// More pictures than any series: a chain that leads back into itself ends here.
+const MOST_PAGES: usize = 10_000;
+/// In the tag of what a picture is to the others, the bit of a smaller copy (TIFF 6.0, NewSubfileType).
+const SMALLER: u32 = 1;
 
 /// What a file announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Header {
-    /// Width, px.
     pub width: u32,
-    /// Height, px.
     pub height: u32,
     /// Pictures in the file, of which the first is read.
     pub pages: usize,
@@ -67,6 +69,22 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
     let decoder = decoder(reader)?;
     let (width, height) = decoder.dimensions();
     Ok(Header { pages, width, height, file_bytes, decoded_bytes: decoder.total_bytes() })
+}
+
+/// The pictures of a TIFF, as far as they can be followed, but for smaller copies; at least one. The first is read, and whoever saved a series in one
+/// file has to know that.
+fn pages(path: &Utf8Path) -> usize {
+    let decoder = File::open(path).ok().and_then(|file| Decoder::new(BufReader::new(file)).ok());
+    let Some(mut decoder) = decoder else { return 1 };
+    let mut pages = 0;
+    for _ in 0..MOST_PAGES {
+        let kind: Option<u32> = decoder.find_tag_unsigned(Tag::NewSubfileType).ok().flatten();
+        pages += usize::from(kind.unwrap_or(0) & SMALLER == 0);
+        if !decoder.more_images() || decoder.next_image().is_err() {
+            break;
+        }
+    }
+    pages.max(1)
 }
 
 /// The decoder of a picture, nothing of which is allocated before what its header announces was checked.
@@ -161,5 +179,34 @@ impl Drop for Claim {
     fn drop(&mut self) {
         *HELD.lock().unwrap_or_else(PoisonError::into_inner) -= self.0;
         RELEASED.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tiff::encoder::{TiffEncoder, colortype::Gray8};
+
+    use super::*;
+
+    #[test]
+    fn pictures_of_a_series_count_and_smaller_copies_do_not() {
+        let (_keep, path) = crate::files::temporary("a.tif", "");
+        let of = |kinds: &[u32]| {
+            let mut file = TiffEncoder::new(File::create(&path).unwrap()).unwrap();
+            for kind in kinds {
+                let mut image = file.new_image::<Gray8>(8, 6).unwrap();
+                image.encoder().write_tag(Tag::NewSubfileType, *kind).unwrap();
+                image.write_data(&[7; 48]).unwrap();
+            }
+            pages(&path)
+        };
+        assert_eq!(of(&[0; 12]), 12);
+        assert_eq!(of(&[0, SMALLER]), 1);
+        assert_eq!(of(&[0]), 1);
+        let whole = std::fs::read(&path).unwrap();
+        for cut in [&whole[..whole.len() / 2], b"P5 1 1 255\n\0"] {
+            std::fs::write(&path, cut).unwrap();
+            assert_eq!(pages(&path), 1);
+        }
     }
 }

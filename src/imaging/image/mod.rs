@@ -4,7 +4,6 @@
 //! they were measured, 8 or 16 bit, and the level at which they are clipped. Nothing is scaled, turned or corrected: two
 //! decoders, or one that "improves", would give two measurements.
 
-mod channels;
 mod clipping;
 mod decode;
 mod grey;
@@ -12,7 +11,6 @@ mod integrity;
 mod jpeg_scan;
 mod limits;
 mod mosaic;
-mod pages;
 pub mod pyramid;
 pub mod raster;
 pub mod wide;

@@ -32,7 +32,6 @@ pub enum Mosaic {
 const ALL: [Mosaic; 4] = [Mosaic::Rggb, Mosaic::Bggr, Mosaic::Grbg, Mosaic::Gbrg];
 
 impl Mosaic {
-    /// The pattern's name.
     pub fn name(self) -> &'static str {
         match self {
             Mosaic::Rggb => "RGGB",

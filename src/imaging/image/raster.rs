@@ -9,9 +9,7 @@ use super::{Grey, Header, Mosaic, mosaic, read};
 /// Samples row by row, the channels of a pixel side by side.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Raster {
-    /// Width, px.
     pub width: usize,
-    /// Height, px.
     pub height: usize,
     /// 1: grey; 3: red, green, blue.
     pub channels: usize,
@@ -22,9 +20,7 @@ pub struct Raster {
 /// Values in the depth of their file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Samples {
-    /// 8 bits.
     Eight(Vec<u8>),
-    /// 16 bits.
     Sixteen(Vec<u16>),
 }
 

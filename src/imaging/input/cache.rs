@@ -36,7 +36,6 @@ pub type Look = Result<Sighting, Refusal>;
 /// A place for what was found.
 #[derive(Debug, Clone, Copy)]
 pub struct Cache<'a> {
-    /// The results folder.
     pub out: &'a OutDir,
     /// Whether small copies of the pictures are kept as well, for a page.
     pub thumbnails: bool,

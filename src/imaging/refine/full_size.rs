@@ -3,10 +3,12 @@
 //! In: a corner's surroundings and what its fit starts from. Out: the fit, or none where it is not plausible. Three windows: a near one, just large
 //! enough to hold an arm on each side of the crossing; the full one, as large as the squares and the picture's light allow; and what lies between.
 
+use std::cell::RefCell;
+
 use nalgebra::Vector2;
 
 use super::Measured;
-use super::acceptance::{self, plausible};
+use super::acceptance::{ALL_LIGHT, Board, MOST_LIGHT_CHANGE, plausible};
 use super::cell::Cell;
 use super::light::veil;
 use super::outlying_pixels::{Explained, few};
@@ -54,10 +56,17 @@ pub(super) struct Full<'a, T> {
     stray: Option<f64>,
     /// Share of the light that may change over a square.
     most_light_change: f64,
+    /// Filled anew for each fit.
+    pub(super) window: &'a RefCell<Window>,
 }
 
 impl<T: Sample> Full<'_, T> {
-    pub(super) fn of<'a>(image: &'a Image<T>, clip_level: f64, detected: &Detected) -> Full<'a, T> {
+    pub(super) fn of<'a>(
+        image: &'a Image<T>,
+        clip_level: f64,
+        detected: &Detected,
+        window: &'a RefCell<Window>,
+    ) -> Full<'a, T> {
         let places = detected.corners.map(|px| detected.level.to_picture(px));
         Full {
             image,
@@ -65,7 +74,8 @@ impl<T: Sample> Full<'_, T> {
             // The middles of squares with markers are neither light nor dark.
             veil: if detected.print.is_none() { veil::level(image, clip_level, &places) } else { 0.0 },
             stray: None,
-            most_light_change: acceptance::MOST_LIGHT_CHANGE,
+            most_light_change: MOST_LIGHT_CHANGE,
+            window,
         }
     }
 
@@ -75,21 +85,21 @@ impl<T: Sample> Full<'_, T> {
     }
 
     /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
-    pub(super) fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>, window: &mut Window) -> Windows {
+    pub(super) fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>) -> Windows {
         let full_px = half_px(cell.side(), margin_px(&start, &cell));
         let near_px = near_half_px(&start);
         let alone = near_px > NEAR_SHARE * full_px;
-        let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start, window) };
+        let near = if alone { coarse } else { self.fit_within(near_px, &cell, &start) };
         Windows { cell, start, bends: [None; 2], alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
     /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
     /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
-    pub(super) fn full(&self, seen: Windows, share: f64, window: &mut Window) -> Windows {
-        let mut within = |half_px: f64| match seen.near.filter(|_| !seen.alone) {
-            Some(near) => self.fit_from(&near, half_px, &seen, window),
+    pub(super) fn full(&self, seen: Windows, share: f64) -> Windows {
+        let within = |half_px: f64| match seen.near.filter(|_| !seen.alone) {
+            Some(near) => self.fit_from(&near, half_px, &seen),
             // Squares that are not alike all over show in a small window as a light that changes, and in a large one hardly.
-            None => self.fit_within(half_px, &seen.cell, &seen.start, window),
+            None => self.fit_within(half_px, &seen.cell, &seen.start),
         };
         // What is hardly larger than the near window is not made smaller.
         let share_px = share * half_px(seen.cell.side(), margin_px(&seen.start, &seen.cell));
@@ -108,14 +118,7 @@ impl<T: Sample> Full<'_, T> {
 
     /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
     /// they are few.
-    pub(super) fn without_outlying(
-        &self,
-        first: &Measured,
-        most_half_px: f64,
-        cell: &Cell,
-        board: &acceptance::Board,
-        window: &mut Window,
-    ) -> Measured {
+    fn without_outlying(&self, first: &Measured, most_half_px: f64, cell: &Cell, board: &Board) -> Measured {
         let clips = first.fit.left_out > 0;
         if !clips && !board.is_rough(first) {
             return *first;
@@ -125,7 +128,7 @@ impl<T: Sample> Full<'_, T> {
         for _ in 0..2 {
             let keep = Explained::by(&best, board.roughness, self.clip_level - self.veil, clips);
             let start = Model { corner: Vector2::zeros(), ..best.fit.model };
-            let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep, window);
+            let again = self.fit_kept(most_half_px, &Cell { place: best.px, ..*cell }, &start, &keep);
             let dropped = |again: &Measured| again.fit.left_out.saturating_sub(first.fit.left_out);
             match again {
                 Some(again) if clips || few(dropped(&again), again.fit.pixels) => best = again,
@@ -136,70 +139,50 @@ impl<T: Sample> Full<'_, T> {
     }
 
     /// The largest window that nothing reaches into: the full one, one between, the near one, or none.
-    pub(super) fn largest_free(
-        &self,
-        seen: &Windows,
-        board: &acceptance::Board,
-        window: &mut Window,
-    ) -> Option<Measured> {
+    pub(super) fn largest_free(&self, seen: &Windows, board: &Board) -> Option<Measured> {
         let seen = Windows {
-            near: seen
-                .near
-                .map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board, window)),
-            full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board, window)),
+            near: seen.near.map(|near| self.without_outlying(&near, near_half_px(&seen.start), &seen.cell, board)),
+            full: seen.full.map(|full| self.without_outlying(&full, seen.most_half_px, &seen.cell, board)),
             ..*seen
         };
         if let Some(full) = seen.free(board) {
             return Some(*full);
         }
         let near = seen.near.as_ref()?;
-        let between = self.between(near, &seen, window);
+        let between = self.between(near, &seen);
         let between = between.filter(|between| board.agrees(near, between) && board.holds_in_small_window(between));
         between.or_else(|| board.holds_in_small_window(near).then_some(*near))
     }
 
     /// What the windows of a corner tell that none of them shows well, and one that is smaller still, without outlying pixels.
-    pub(super) fn windows_left(&self, seen: &Windows, board: &acceptance::Board, window: &mut Window) -> Vec<Measured> {
-        let any = Full { most_light_change: acceptance::ALL_LIGHT, ..*self };
+    pub(super) fn windows_left(&self, seen: &Windows, board: &Board) -> Vec<Measured> {
+        let any = Full { most_light_change: ALL_LIGHT, ..*self };
         let near_px = near_half_px(&seen.start);
         let small_px = SMALLEST * near_px;
-        let near = seen.near.or_else(|| any.fit_within(near_px, &seen.cell, &seen.start, window));
-        let small = any.fit_within(small_px, &seen.cell, &seen.start, window);
-        let between = near.and_then(|near| any.between(&near, seen, window));
+        let near = seen.near.or_else(|| any.fit_within(near_px, &seen.cell, &seen.start));
+        let small = any.fit_within(small_px, &seen.cell, &seen.start);
+        let between = near.and_then(|near| any.between(&near, seen));
         let all = [(small, small_px), (near, near_px), (between, BETWEEN * near_px), (seen.full, seen.most_half_px)];
-        let cleaned = |(fit, half_px): (Option<Measured>, f64)| {
-            Some(any.without_outlying(&fit?, half_px, &seen.cell, board, window))
-        };
+        let cleaned =
+            |(fit, half_px): (Option<Measured>, f64)| Some(any.without_outlying(&fit?, half_px, &seen.cell, board));
         all.into_iter().filter_map(cleaned).collect()
     }
 
-    fn between(&self, near: &Measured, seen: &Windows, window: &mut Window) -> Option<Measured> {
-        self.fit_from(near, BETWEEN * near_half_px(&seen.start), seen, window)
+    fn between(&self, near: &Measured, seen: &Windows) -> Option<Measured> {
+        self.fit_from(near, BETWEEN * near_half_px(&seen.start), seen)
     }
 
     /// A fit in a larger window, from what a smaller one told.
-    pub(super) fn fit_from(
-        &self,
-        near: &Measured,
-        most_half_px: f64,
-        seen: &Windows,
-        window: &mut Window,
-    ) -> Option<Measured> {
+    pub(super) fn fit_from(&self, near: &Measured, most_half_px: f64, seen: &Windows) -> Option<Measured> {
         // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
         let bend = [0, 1].map(|k| if seen.cell.own_bends[k] { near.fit.model.bend[k] } else { seen.start.bend[k] });
         let start = Model { corner: Vector2::zeros(), bend, ..near.fit.model };
-        self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start, window)
+        self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start)
     }
 
     /// A fit in a window that reaches up to `most_half_px` along each edge.
-    pub(super) fn fit_within(
-        &self,
-        most_half_px: f64,
-        cell: &Cell,
-        start: &Model,
-        window: &mut Window,
-    ) -> Option<Measured> {
-        self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil), window)
+    fn fit_within(&self, most_half_px: f64, cell: &Cell, start: &Model) -> Option<Measured> {
+        self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil))
     }
 
     /// A window beside markers that stays in the picture: what is cut off on one side alone moves a corner of oblique edges, and parts of boards
@@ -215,15 +198,9 @@ impl<T: Sample> Full<'_, T> {
     }
 
     /// The same with the pixels that are to be kept.
-    pub(super) fn fit_kept(
-        &self,
-        most_half_px: f64,
-        cell: &Cell,
-        start: &Model,
-        keep: &impl Keep,
-        window: &mut Window,
-    ) -> Option<Measured> {
+    fn fit_kept(&self, most_half_px: f64, cell: &Cell, start: &Model, keep: &impl Keep) -> Option<Measured> {
         let mut start = *start;
+        let mut window = self.window.borrow_mut();
         let beside = Beside { stray: self.stray, bends: cell.own_bends };
         for round in 1.. {
             let blur = start.blur_px[0].max(start.blur_px[1]);
@@ -233,7 +210,7 @@ impl<T: Sample> Full<'_, T> {
             let band_px = BAND_BLURS * blur + 1.0;
             let hidden = cell.hidden(blur)?;
             window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px, hidden });
-            let found = fit(&start, window, beside)?;
+            let found = fit(&start, &window, beside)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
             let in_band = BAND_BLURS * wider <= 1.2 * band_px;

@@ -10,6 +10,8 @@
 //! share what they know of the light, which counts from the picture's veil (`light`). Goes wrong: a corner without contrast,
 //! hidden, or cut off by the border; it is dropped, the others stay.
 
+use std::cell::RefCell;
+
 use nalgebra::{Matrix2, Vector2};
 
 use super::cell::Cell;
@@ -18,7 +20,7 @@ use super::curvature::{Bend, Point, Rule, bends};
 use super::full_size::Full;
 use super::light::illumination;
 use super::light::stray::{self, Slope};
-use super::saddle_fit::window::{Sample, Window};
+use super::saddle_fit::window::Sample;
 use super::saddle_fit::{Measured, Model};
 use super::scatter::Scatter;
 use super::windows::{Windows, bends_by, usual};
@@ -55,9 +57,10 @@ pub fn refine(picture: &Picture, detected: &Detected) -> Lattice<Corner> {
 
 /// Measures all corners of a board, with what else the fits tell.
 pub fn measure(picture: &Picture, detected: &Detected) -> Lattice<Measured> {
+    let (clip_level, window) = (picture.clip_level(), RefCell::default());
     match &picture.grey {
-        Grey::Eight(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
-        Grey::Sixteen(image) => Full::of(image, picture.clip_level(), detected).measure(detected),
+        Grey::Eight(image) => Full::of(image, clip_level, detected, &window).measure(detected),
+        Grey::Sixteen(image) => Full::of(image, clip_level, detected, &window).measure(detected),
     }
 }
 
@@ -70,13 +73,12 @@ struct Seen {
 
 impl<T: Sample> Full<'_, T> {
     fn measure(&self, detected: &Detected) -> Lattice<Measured> {
-        let mut window = Window::default();
-        let mut seen = self.look(detected, &mut window);
+        let mut seen = self.look(detected);
         // Where corners are as noise makes them there is nothing to look for.
         if scatter::miss_the_model(&seen.measured)
-            && let Some(stray) = self.stray_light(&seen.windows, &mut window)
+            && let Some(stray) = self.stray_light(&seen.windows)
         {
-            let with_stray = self.with_stray(stray).look(detected, &mut window);
+            let with_stray = self.with_stray(stray).look(detected);
             if !is_more_uneven(&with_stray.measured, &seen.measured) {
                 seen = with_stray;
             }
@@ -90,7 +92,7 @@ impl<T: Sample> Full<'_, T> {
             let well = measured.get(col, row).copied();
             well.or_else(|| {
                 let seen = windows.get(col, row)?;
-                let known = self.windows_left(seen, &board, &mut window);
+                let known = self.windows_left(seen, &board);
                 let known = known.into_iter().map(|corner| scatter.alone(seen.with_lines(corner)));
                 known.filter(|corner| acceptance::is_of_use(corner, usual_px2)).min_by(by_variance)
             })
@@ -98,11 +100,11 @@ impl<T: Sample> Full<'_, T> {
     }
 
     /// Variance of the slope of stray light by the near windows, in each of which it is fitted without a bound.
-    fn stray_light(&self, seen: &Lattice<Windows>, window: &mut Window) -> Option<f64> {
+    fn stray_light(&self, seen: &Lattice<Windows>) -> Option<f64> {
         let unbound = self.with_stray(stray::UNBOUND);
         let mut fits = seen.filter_map(|_, _, windows| {
             let near = windows.near.or(windows.full)?;
-            unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows, window)
+            unbound.fit_from(&near, full_size::near_half_px(&windows.start), windows)
         });
         Scatter::of(&fits).carry(&mut fits);
         let slope = |fit: &Measured| fit.fit.stray.map(|(slope, own)| Slope { px: fit.px, slope, own });
@@ -110,8 +112,8 @@ impl<T: Sample> Full<'_, T> {
     }
 
     /// What the board's windows tell, from the first fits on.
-    fn look(&self, detected: &Detected, window: &mut Window) -> Seen {
-        let coarse = coarse(detected, window);
+    fn look(&self, detected: &Detected) -> Seen {
+        let coarse = coarse(detected, &mut self.window.borrow_mut());
         let columns = coarse.columns;
         let at = |bends: &[[Option<Bend>; 2]], col: usize, row: usize| bends[row * columns + col];
         let on_copy = |m: &Measured| {
@@ -140,7 +142,7 @@ impl<T: Sample> Full<'_, T> {
             let first = (scale == 1.0)
                 .then_some(*from)
                 .filter(|from| from.fit.model.blur_px.iter().all(|blur_px| cell.stands_alone(*blur_px)));
-            let near = self.near(cell, start, first, window);
+            let near = self.near(cell, start, first);
             Some(Windows { bends, ..near })
         });
         // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
@@ -148,28 +150,23 @@ impl<T: Sample> Full<'_, T> {
         let board = acceptance::Board::of(&near_only, &[]);
         let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
         let near = near.filter_map(|col, row, windows| Some(windows.clone().rebent(at(&near_bends, col, row))));
-        let (windows, board) = self.large(&near, &places, window);
-        let measured = windows.filter_map(|_, _, seen| Some(seen.with_lines(self.largest_free(seen, &board, window)?)));
+        let (windows, board) = self.large(&near, &places);
+        let measured = windows.filter_map(|_, _, seen| Some(seen.with_lines(self.largest_free(seen, &board)?)));
         Seen { windows, board, measured }
     }
 
     /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
     /// with what is usual in them.
-    fn large(
-        &self,
-        near: &Lattice<Windows>,
-        places: &Places,
-        window: &mut Window,
-    ) -> (Lattice<Windows>, acceptance::Board) {
+    fn large(&self, near: &Lattice<Windows>, places: &Places) -> (Lattice<Windows>, acceptance::Board) {
         // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
         let few = near.count() < LEAST_TRIED * TRIED;
         let tried = near.filter_map(|col, row, seen| {
-            (few || (col + row).is_multiple_of(TRIED)).then(|| self.full(seen.clone(), 1.0, window))
+            (few || (col + row).is_multiple_of(TRIED)).then(|| self.full(seen.clone(), 1.0))
         });
-        let mut within = |share: f64| {
+        let within = |share: f64| {
             let seen = near.filter_map(|col, row, from| {
                 let known = tried.get(col, row).filter(|_| share == 1.0).cloned();
-                known.or_else(|| Some(self.full(from.clone(), share, window)))
+                known.or_else(|| Some(self.full(from.clone(), share)))
             });
             let board = usual(&seen);
             let bends = bends_by(&seen, places, |windows| windows.free(&board).copied());

@@ -15,7 +15,6 @@ use crate::imaging::{Error, Result, Side};
 /// Two sides paired.
 #[derive(Debug, Clone)]
 pub struct Matched {
-    /// How.
     pub by: PairBy,
     /// How those were paired that are named in another way than most.
     pub also: Option<PairBy>,

@@ -18,11 +18,7 @@ pub enum PairBy {
 impl PairBy {
     /// The word in messages.
     pub fn word(self) -> &'static str {
-        match self {
-            PairBy::Name => "name",
-            PairBy::Number => "number",
-            PairBy::Order => "order",
-        }
+        ["name", "number", "order"][self as usize]
     }
 }
 
@@ -31,9 +27,7 @@ impl PairBy {
 pub struct PairFiles {
     /// Name of the pair: the pictures' common stem, what is left of both without the word for the side, or their number.
     pub pair: String,
-    /// The left picture.
     pub left: Utf8PathBuf,
-    /// The right picture.
     pub right: Utf8PathBuf,
 }
 
@@ -64,26 +58,17 @@ pub enum Halves {
 impl Halves {
     /// The flag that says so.
     pub fn flag(self) -> &'static str {
-        match self {
-            Halves::SideBySide => "--side-by-side",
-            Halves::TopBottom => "--top-bottom",
-        }
+        ["--side-by-side", "--top-bottom"][self as usize]
     }
 
     /// The two halves, the left camera's first.
     pub fn words(self) -> [&'static str; 2] {
-        match self {
-            Halves::SideBySide => ["left", "right"],
-            Halves::TopBottom => ["upper", "lower"],
-        }
+        [["left", "right"], ["upper", "lower"]][self as usize]
     }
 
     /// The extent that is cut.
     pub fn extent(self) -> &'static str {
-        match self {
-            Halves::SideBySide => "wide",
-            Halves::TopBottom => "high",
-        }
+        ["wide", "high"][self as usize]
     }
 }
 

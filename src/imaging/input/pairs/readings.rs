@@ -49,7 +49,6 @@ pub struct Reading {
     pub places: Vec<Utf8PathBuf>,
     /// Pictures of each side.
     pub sides: [Vec<Utf8PathBuf>; 2],
-    /// The pairs.
     pub matched: Matched,
     /// Pictures whose names tell no side.
     pub sideless: usize,

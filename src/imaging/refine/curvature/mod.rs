@@ -7,7 +7,6 @@
 //! corners, which only the windows themselves show to bend.
 
 mod bend;
-mod line;
 mod lines;
 mod parallel;
 

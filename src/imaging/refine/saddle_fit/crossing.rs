@@ -26,7 +26,6 @@ pub struct Crossing {
 }
 
 impl Crossing {
-    /// The crossing of a model's edges.
     pub fn new(model: &Model) -> Crossing {
         // Gauss-Legendre on [0, 1], six points: good to 1e-5 down to edges 45 degrees apart.
         const NODES: [(f64, f64); 6] = [

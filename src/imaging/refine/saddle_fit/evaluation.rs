@@ -224,14 +224,10 @@ impl Model {
 type Share = (usize, usize, f64);
 
 /// Adds the sums of the derivatives' products, from those of the columns that they are made of. Most shares are none, so they are listed.
-fn add_mapped<const C: usize, const A: usize>(
-    total: &mut SMatrix<f64, C, C>,
-    map: &[Share],
-    sums: &SMatrix<f64, A, A>,
-) {
+fn add_mapped<const C: usize, const A: usize>(to: &mut SMatrix<f64, C, C>, map: &[Share], sums: &SMatrix<f64, A, A>) {
     for &(row, a, share) in map {
         for &(column, b, other) in map {
-            total[(row, column)] += share * other * sums[(a, b)];
+            to[(row, column)] += share * other * sums[(a, b)];
         }
     }
 }

@@ -24,7 +24,6 @@ pub struct Fit {
     pub misfits: [Misfit; 2],
     /// Slope of stray light, grey values per px, and its covariance, where it was looked for.
     pub stray: Option<(Vector2<f64>, Matrix2<f64>)>,
-    /// Number of pixels.
     pub pixels: usize,
     /// Number of pixels in the window that were left out: saturated, or not explained by a first fit.
     pub left_out: usize,

@@ -95,13 +95,8 @@ pub fn fit(start: &Model, window: &Window, beside: Beside) -> Option<Fit> {
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost().is_finite()).then_some(fit)
 }
 
-/// The model at the end of all steps, what the pixels made of it one short step before, and the number of steps.
-fn settled(
-    start: Model,
-    window: &Window,
-    freedom: f64,
-    least_blur_px: f64,
-) -> Option<(Model, Evaluation<COLUMNS>, usize)> {
+/// The model at the end of all steps, what the pixels made of it one short step before, and the number of steps; with blurs of `least` px at the least.
+fn settled(start: Model, window: &Window, freedom: f64, least: f64) -> Option<(Model, Evaluation<COLUMNS>, usize)> {
     /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a third of its sigma;
     /// that step is still taken, and steps shrink at least tenfold by then, so less than a thirtieth is left. Of 2400 corners half were
     /// within 0.0002 sigma of where further steps took them, and 99 of 100 within 0.002.
@@ -115,7 +110,7 @@ fn settled(
     let mut damping = 1e-3;
     for steps in 1..=MAX_STEPS {
         let (mut matrix, mut gradient) = at.equations();
-        model.hold_least_blur(&mut matrix, &mut gradient, least_blur_px);
+        model.hold_least_blur(&mut matrix, &mut gradient, least);
         // A damped step gains little because it is short: only the undamped one tells how far the end is.
         let whole = matrix.cholesky()?.solve(&gradient);
         if !whole.iter().all(|v| v.is_finite()) {
@@ -123,13 +118,13 @@ fn settled(
         }
         let grey = model.level.abs() + model.half_contrast.abs();
         if gradient.dot(&whole) < SETTLED * (at.cost() / freedom).max((LEAST_RESIDUAL * grey).powi(2)) {
-            return Some((model.add(&whole, least_blur_px), at, steps));
+            return Some((model.add(&whole, least), at, steps));
         }
         let mut damped = matrix;
         for i in 0..N {
             damped[(i, i)] *= 1.0 + damping;
         }
-        let next = model.add(&damped.cholesky()?.solve(&gradient), least_blur_px);
+        let next = model.add(&damped.cholesky()?.solve(&gradient), least);
         let there = next.evaluate(window);
         // The gain that counts is the one that came out, as far as rounding lets it be seen.
         let rounding = 2.0 * ROUNDING * grey * (at.cost() * freedom).sqrt();

@@ -49,7 +49,6 @@ pub struct Edge {
     corner: [f32; 2],
     /// Sine and cosine of its direction.
     pub sin: f32,
-    /// See `sin`.
     pub cos: f32,
     /// 1 / s, 1/px.
     per_blur: f32,
@@ -69,7 +68,6 @@ pub struct Light {
 }
 
 impl Light {
-    /// That of a model.
     pub fn of(model: &Model) -> Light {
         let Model { level, half_contrast, light_slope, .. } = *model;
         let slope = [light_slope.x as f32, light_slope.y as f32];
@@ -90,7 +88,6 @@ pub struct Across {
 }
 
 impl Edge {
-    /// Edge `k` of a model.
     pub fn of(model: &Model, k: usize) -> Edge {
         let (sin, cos) = model.angles_rad[k].sin_cos();
         Edge {

@@ -18,7 +18,6 @@ pub struct Products<const C: usize> {
 }
 
 impl<const C: usize> Products<C> {
-    /// Nothing yet.
     pub fn new() -> Products<C> {
         Products { sums: SMatrix::zeros(), latest: [[[0.0; WIDTH]; C]; C], groups: 0 }
     }

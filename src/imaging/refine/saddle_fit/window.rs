@@ -30,7 +30,6 @@ pub struct Group {
     pub x: Lanes,
     /// y - y0, px.
     pub y: Lanes,
-    /// Grey value.
     pub grey: Lanes,
     /// One for a pixel, zero for none: the last group is filled up.
     pub weight: Lanes,
@@ -126,7 +125,6 @@ impl Keep for Below {
 }
 
 impl Groups {
-    /// Adds a pixel.
     #[inline]
     pub fn push(&mut self, x: f32, y: f32, grey: f32) {
         let lane = self.count % LANES;
@@ -186,18 +184,8 @@ impl Window {
                 interval.map_or(0..0, |(low, high)| whole(cut.start.x + low, cut.start.x + high, width))
             });
             // Each of these is where one run of equal pixels ends and the next begins.
-            let mut ends = [
-                inside.start,
-                near[0].start,
-                near[0].end,
-                near[1].start,
-                near[1].end,
-                hidden[0].start,
-                hidden[0].end,
-                hidden[1].start,
-                hidden[1].end,
-                inside.end,
-            ];
+            let mut ends = [&inside, &near[0], &near[1], &hidden[0], &hidden[1]].map(|of| [of.start, of.end]);
+            let ends = ends.as_flattened_mut();
             ends.iter_mut().for_each(|end| *end = (*end).clamp(inside.start, inside.end.max(inside.start)));
             ends.sort_unstable();
             for run in ends.windows(2).map(|ends| ends[0]..ends[1]).filter(|run| !run.is_empty()) {
@@ -212,12 +200,12 @@ impl Window {
                     [false, true] => &mut self.arms[1][side[0]],
                     [false, false] if y.is_multiple_of(step) => {
                         let alike = usize::from(side[0] == side[1]);
-                        self.left_out += add(&mut self.flat[alike], row, run, (veil, keep), (dx, dy));
+                        self.left_out += add(&mut self.flat[alike], &row[run], (veil, keep), (dx, dy));
                         continue;
                     }
                     [false, false] => continue,
                 };
-                self.left_out += push(groups, row, run, (veil, keep), (dx, dy));
+                self.left_out += push(groups, &row[run], (veil, keep), (dx, dy));
             }
         }
     }
@@ -225,15 +213,9 @@ impl Window {
 
 /// Adds a run of pixels one by one; `from` is the first one's place. Returns how many were not kept.
 #[inline(always)]
-fn push<T: Sample>(
-    to: &mut Groups,
-    row: &[T],
-    run: Range<usize>,
-    (veil, keep): (f64, &impl Keep),
-    from: (f64, f64),
-) -> usize {
+fn push<T: Sample>(to: &mut Groups, values: &[T], (veil, keep): (f64, &impl Keep), from: (f64, f64)) -> usize {
     let mut left_out = 0;
-    for (i, &value) in row[run].iter().enumerate() {
+    for (i, &value) in values.iter().enumerate() {
         let value: f64 = value.into();
         let (x, grey) = (from.0 + i as f64, value - veil);
         if keep.keeps(x, from.1, grey) {
@@ -251,14 +233,7 @@ const SIDE_BY_SIDE: usize = 16;
 /// Adds a run of pixels to the sums of products of `(1, x, y, grey)`; `from` is the first one's place. Returns how
 /// many were not kept.
 #[inline(always)]
-fn add<T: Sample>(
-    to: &mut Matrix4<f64>,
-    row: &[T],
-    run: Range<usize>,
-    (veil, keep): (f64, &impl Keep),
-    from: (f64, f64),
-) -> usize {
-    let values = &row[run];
+fn add<T: Sample>(to: &mut Matrix4<f64>, values: &[T], (veil, keep): (f64, &impl Keep), from: (f64, f64)) -> usize {
     let [n, x, xx, g, xg, gg] = if keep.keeps_up_to(highest(values) - veil) {
         run_sums(values, veil)
     } else {
