@@ -75,8 +75,8 @@ impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Missing { path, .. } => Some(path.to_string()),
-            Error::Io { .. } | Error::OverInput { .. } | Error::OverForeign { .. } => None,
             Error::Format { place, .. } => Some(place.to_string()),
+            _ => None,
         }
     }
     fn hint(&self) -> Option<String> {
@@ -102,27 +102,18 @@ const MOST_TEXT_BYTES: u64 = 64 << 20;
 
 /// Reads a text file; `what` names it in the message when it is not there, `hint` says what makes it.
 pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<String> {
-    read_text_up_to(path, what, hint, MOST_TEXT_BYTES)
-}
-
-/// Reads a text file of a size that the caller thinks possible; a longer one is refused, and never read to its end.
-pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
     let not_text = |_| Error::format(path, None, format!("{what}: not UTF-8 text"), None);
-    String::from_utf8(read_bytes_up_to(path, what, hint, most_bytes)?).map_err(not_text)
+    String::from_utf8(read_text_bytes(path, what, hint)?).map_err(not_text)
 }
 
-/// Reads a text file in whatever encoding.
-pub fn read_text_bytes(path: &Utf8Path, what: &'static str) -> Result<Vec<u8>> {
-    read_bytes_up_to(path, what, None, MOST_TEXT_BYTES)
-}
-
-fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<Vec<u8>> {
+/// Reads a text file in whatever encoding; one that is too long is never read to its end.
+pub fn read_text_bytes(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
-    let refuse = |message: String| Error::format(path, None, message, None);
+    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_TEXT_BYTES + 1).read_to_end(&mut bytes));
     match read {
-        Ok(_) if bytes.len() as u64 > most_bytes => {
-            Err(refuse(format!("{what}: more than {} MB of text; no such file is that long", most_bytes >> 20)))
+        Ok(_) if bytes.len() as u64 > MOST_TEXT_BYTES => {
+            let message = format!("{what}: more than {} MB of text; no such file is that long", MOST_TEXT_BYTES >> 20);
+            Err(Error::format(path, None, message, None))
         }
         Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
@@ -240,13 +231,13 @@ pub fn is_temporary(name: &str) -> bool {
 /// Writes a file whole or not at all, making its folder where needed: to a temporary name beside it, then renamed.
 pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -> Result<()> {
     let io = |source| Error::Io { action: "write", path: path.to_owned(), source: without_path(source) };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_str().is_empty() => folder,
-        _ => Utf8Path::new("."),
-    };
+    let folder = path.parent().filter(|folder| !folder.as_str().is_empty()).unwrap_or(Utf8Path::new("."));
     std::fs::create_dir_all(folder).map_err(io)?;
-    let mut file =
-        tempfile::Builder::new().prefix(TEMPORARY).permissions_like_others().tempfile_in(folder).map_err(io)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are private by default; results are meant to be read by colleagues (the umask still applies).
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.prefix(TEMPORARY).tempfile_in(folder).map_err(io)?;
     file.write_all(bytes).map_err(io)?;
     if durability == Durability::Synced {
         file.as_file().sync_all().map_err(io)?;
@@ -270,22 +261,6 @@ fn sync_folder(folder: &Utf8Path) -> std::io::Result<()> {
     match std::fs::File::open(folder).and_then(|folder| folder.sync_all()) {
         Err(e) if matches!(e.kind(), InvalidInput | PermissionDenied | Unsupported) => Ok(()),
         done => done,
-    }
-}
-
-trait PermissionsLikeOthers {
-    fn permissions_like_others(&mut self) -> &mut Self;
-}
-
-impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
-    /// Temporary files are private by default; results are meant to be read by colleagues (the umask still applies).
-    fn permissions_like_others(&mut self) -> &mut Self {
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            self.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        self
     }
 }
 

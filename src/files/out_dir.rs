@@ -140,14 +140,12 @@ impl OutDir {
         // Not under the lock: pictures that nobody has read are hashed by all threads.
         let digested: Vec<_> = folders.iter().map(|(at, path)| (at, Digested::folder(path, &known))).collect();
         let mut state = self.state();
-        let inputs = state.provenance.as_mut().map(|provenance| &mut provenance.inputs);
-        if let Some(inputs) = inputs {
-            for (at, folder) in digested {
-                // One that could not be read leaves those after it a place too far.
-                if let Some(folder) = folder {
-                    inputs.insert((*at).min(inputs.len()), folder);
-                }
-            }
+        if let Some(Provenance { inputs, .. }) = &mut state.provenance {
+            // One that could not be read leaves those after it a place too far.
+            digested
+                .into_iter()
+                .filter_map(|(at, folder)| Some((at, folder?)))
+                .for_each(|(at, folder)| inputs.insert((*at).min(inputs.len()), folder));
         }
         state.provenance.clone()
     }
@@ -179,13 +177,8 @@ impl OutDir {
             self.sweep(&mut state, &path);
             let line = format!("{}  {}\n", digested.sha256, one_line(name));
             // Remembered before it is renamed into place: a run that is killed between leaves no file that it does not know.
-            if let Some(log) = &mut state.log {
-                log.write_all(line.as_bytes()).map_err(|source| Error::Io {
-                    action: "write",
-                    path: path.clone(),
-                    source,
-                })?;
-            }
+            let io = |source| Error::Io { action: "write", path: path.clone(), source };
+            state.log.as_mut().map_or(Ok(()), |log| log.write_all(line.as_bytes())).map_err(io)?;
             state.written.entry(one_line(name)).or_default().insert(digested.sha256.clone());
         }
         write_atomically(&path, bytes, Durability::Synced)?;

@@ -65,8 +65,8 @@ impl Part {
         }
         let headed = match grid.form {
             Form::Program { .. } => header::Headed { names: None, rows: grid.rows.clone() },
-            _ => match header::split(&grid) {
-                Err(_) if named => header::rows_alone(&grid)?,
+            _ => match header::split(&grid, &header::is_number) {
+                Err(_) if named => header::rows_alone(&grid, &header::is_number)?,
                 headed => headed?,
             },
         };
