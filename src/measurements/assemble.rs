@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::columns::judge::{Basis, Way};
-use super::columns::layout::{ONE_POINT, are_readings, is_kept};
+use super::columns::layout::{ONE_POINT, are_readings, is_kept, point};
 use super::columns::part::{At, Kind, Part};
 use super::columns::pick::{self, listed};
 use super::rows::{Measurement, from_table, reading_name};
@@ -22,13 +22,13 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     let counts: Vec<String> = parts.iter().map(|p| format!("{} has {} rows", p.file_name(), p.rows.len())).collect();
     for part in parts.iter_mut().filter(|part| part.rows.len() != least) {
         let times = part.rows.len() / least;
-        let order = if times * least == part.rows.len() { order(part, least, times) } else { None };
-        let Some(order) = order else {
+        let strides = if times * least == part.rows.len() { strides(part, least, times) } else { None };
+        let Some((of_row, of_reading)) = strides else {
             let hint = "files are joined row by row: the same rows in each, or for each pose so many readings one after the other, whose distances are kept";
             return Err(part.refuse(counts.join(", "), Some(hint)));
         };
         let together = |row: usize| {
-            let all: Vec<&(u64, Fields)> = (0..times).map(|k| &part.rows[order(row, k)]).collect();
+            let all: Vec<&(u64, Fields)> = (0..times).map(|k| &part.rows[row * of_row + k * of_reading]).collect();
             (all[0].0, Fields::new(all.iter().flat_map(|(_, fields)| fields.iter())))
         };
         let rows = (0..least).map(together).collect();
@@ -49,23 +49,19 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     Ok(widened)
 }
 
-/// Where the k-th reading of a pose stands: one after the other, or first all of the first target.
-fn order(part: &Part, poses: usize, times: usize) -> Option<Box<dyn Fn(usize, usize) -> usize>> {
-    let columns = coordinates(part)?;
-    let point = |row: usize| -> Option<nalgebra::Point3<f64>> {
-        let number = |c: usize| part.optional(row, c).ok().flatten();
-        Some(nalgebra::Point3::new(number(columns[0])?, number(columns[1])?, number(columns[2])?))
-    };
+/// How many rows farther the next pose stands, and the next reading of a pose: one after the other, or first all of the first target.
+fn strides(part: &Part, poses: usize, times: usize) -> Option<(usize, usize)> {
+    let columns = coordinates(part)?.map(|column| At { part: 0, column });
+    let point = |row: usize| point(std::slice::from_ref(part), row, &columns);
     let apart = |a: usize, b: usize| Some((point(a)? - point(b)?).norm());
     let next: Vec<f64> = (0..poses).filter_map(|row| apart(row * times, row * times + 1)).collect();
     let between: Vec<f64> = (1..poses).filter_map(|row| apart((row - 1) * times, row * times)).collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
     if is_kept(next.clone()) || mean(&next) < ONE_POINT * mean(&between) {
-        return Some(Box::new(move |row, k| row * times + k));
+        return Some((times, 1));
     }
     let later: Vec<f64> = (0..poses).filter_map(|row| apart(row, poses + row)).collect();
-    (is_kept(later.clone()) || mean(&later) < ONE_POINT * mean(&between))
-        .then(|| -> Box<dyn Fn(usize, usize) -> usize> { Box::new(move |row, k| k * poses + row) })
+    (is_kept(later.clone()) || mean(&later) < ONE_POINT * mean(&between)).then_some((1, poses))
 }
 
 /// The first three columns that are a point.

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Measurement, Observed, Role};
+use super::{Measurement, Role};
 use crate::files::provenance::sha256;
 
 /// Digits of a word: among a million rows two different ones share it with a chance of one in ten million.
@@ -54,12 +54,7 @@ impl Given {
 
 /// `None` of a row without a reading.
 fn word(row: &Measurement) -> Option<String> {
-    let reading: Vec<f64> = match &row.observed {
-        Observed::Position { point_mm, .. } => point_mm.iter().copied().collect(),
-        Observed::Distance { distance_mm, .. } => vec![*distance_mm],
-        Observed::Missing { .. } => return None,
-    };
-    Some(word_of(&row.at.joints_deg, &reading))
+    Some(word_of(&row.at.joints_deg, &row.observed.read()?))
 }
 
 fn word_of(joints_deg: &[f64], reading: &[f64]) -> String {
@@ -74,7 +69,7 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::measurements::{Observed, RobotPose};
 
     fn row(joint: f64, x: f64, role: Role) -> Measurement {
         let at = RobotPose {

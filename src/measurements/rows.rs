@@ -80,6 +80,17 @@ pub enum Observed {
     },
 }
 
+impl Observed {
+    /// The numbers that were read, mm.
+    pub(super) fn read(&self) -> Option<Vec<f64>> {
+        match self {
+            Observed::Position { point_mm, .. } => Some(point_mm.iter().copied().collect()),
+            Observed::Distance { distance_mm, .. } => Some(vec![*distance_mm]),
+            Observed::Missing { .. } => None,
+        }
+    }
+}
+
 /// A row of `measurements.csv`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
