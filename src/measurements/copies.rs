@@ -98,17 +98,14 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::identify::synthetic::{self, seen_at};
 
     fn row(k: usize, role: Role, observed: Observed) -> Measurement {
-        let (pose, joints_deg) = (format!("{}{k}", role.name()), vec![k as f64, 30.0]);
-        let at = RobotPose { pose, group: "g".into(), role, joints_deg, slides: vec![] };
-        Measurement { at, target: String::new(), observed }
+        synthetic::row(format!("{}{k}", role.name()), "g", role, vec![k as f64, 30.0], observed)
     }
 
     fn point(k: usize, off_mm: f64) -> Observed {
-        let point_mm = Point3::new(1000.1234 + 50.0 * k as f64 + off_mm, 20.0, 30.0);
-        Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None }
+        seen_at(Point3::new(1000.1234 + 50.0 * k as f64 + off_mm, 20.0, 30.0))
     }
 
     fn distance(k: usize, off_mm: f64) -> Observed {

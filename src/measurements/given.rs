@@ -69,22 +69,10 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::measurements::{Observed, RobotPose};
+    use crate::identify::synthetic::{self, seen_at};
 
     fn row(joint: f64, x: f64, role: Role) -> Measurement {
-        let at = RobotPose {
-            pose: format!("{joint}"),
-            group: "g".into(),
-            role,
-            joints_deg: vec![joint, -0.0],
-            slides: vec![],
-        };
-        let point_mm = Point3::new(x, 2.0, 3.0);
-        Measurement {
-            at,
-            target: String::new(),
-            observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
-        }
+        synthetic::row(joint.to_string(), "g", role, vec![joint, -0.0], seen_at(Point3::new(x, 2.0, 3.0)))
     }
 
     #[test]
