@@ -20,10 +20,11 @@ impl Style {
         let (mut by_commas, mut by_points, mut decimal) = (false, false, false);
         for cell in cells.filter(|cell| cell.contains(',') && cell.len() < 40 || cell.matches('.').count() > 1) {
             let cell = bare(cell);
-            by_commas |=
-                ungrouped(&cell, ',', '.').is_some_and(|_| cell.contains('.') || cell.matches(',').count() > 1);
-            by_points |=
-                ungrouped(&cell, '.', ',').is_some_and(|_| cell.contains(',') || cell.matches('.').count() > 1);
+            let sets_apart = |by: char, decimal: char| {
+                ungrouped(&cell, by, decimal).is_some() && (cell.contains(decimal) || cell.matches(by).count() > 1)
+            };
+            by_commas |= sets_apart(',', '.');
+            by_points |= sets_apart('.', ',');
             decimal |= is_decimal_comma(&cell);
         }
         let both = by_commas && (by_points || decimal);
