@@ -86,7 +86,6 @@ pub struct Check {
 #[derive(Debug, Clone)]
 pub struct Calibrated {
     pub rig: Rig,
-    /// How corners scattered.
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: Option<f64>,

@@ -46,7 +46,6 @@ pub fn read(named: &[LensFile]) -> Result<Option<KnownLenses>> {
     Ok(known)
 }
 
-/// What the flag takes.
 const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
 
 fn read_one(file: &LensFile) -> Result<KnownLenses> {

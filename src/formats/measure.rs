@@ -33,7 +33,6 @@ const UNUSUAL_NOISE: f64 = 2.0;
 /// Poses that disagree with one rig by this many times chance are worth a warning.
 const UNUSUAL_EXCESS: f64 = 2.25;
 
-/// The content of `measure.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasureFile {
     /// Crossings of the target in a row.
@@ -109,7 +108,6 @@ impl MeasureFile {
     }
 }
 
-/// What is said of the rig.
 fn rig_record(series: &Series, board: &Board, rig: &Rig) -> Value {
     let (state, changes, moved_before) = match &series.judgement {
         Judgement::Agrees => ("agrees", &[][..], None),

@@ -28,7 +28,6 @@ pub struct Determined {
     pub expected: Vec<Expected>,
 }
 
-/// `plan.json`
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanFile {
     #[serde(flatten)]

@@ -30,7 +30,6 @@ pub struct RectifiedFile {
     /// How far the rows differ over all corners of the board that was found; null without a board.
     pub residual: Option<RowResidual>,
     pub board: Option<String>,
-    /// The pairs written.
     pub pairs: Vec<RectifiedPair>,
     /// The pairs not written, and why.
     pub pairs_skipped: Vec<Skipped>,

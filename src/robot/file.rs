@@ -147,7 +147,6 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// Reads `robot.toml`.
 pub fn read(path: &Utf8Path) -> Result<Robot> {
     read_checked(path).map(|(robot, _)| robot)
 }

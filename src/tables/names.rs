@@ -81,9 +81,7 @@ pub enum What {
 /// A column's name, understood.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Name {
-    /// What it holds.
     pub what: What,
-    /// The unit that it states.
     pub unit: Option<Unit>,
     /// What else the name says, to tell one set of columns from another.
     pub key: Vec<String>,
@@ -127,7 +125,6 @@ impl Name {
         self.key.iter().find(|word| counts && is_in(UNREAD, word)).map(String::as_str)
     }
 
-    /// Reads a name.
     pub fn of(name: &str) -> Name {
         let name = name.trim().trim_start_matches(['#', '%']).trim();
         if let Some(own) = OWN.iter().find(|own| name.eq_ignore_ascii_case(own)) {

@@ -34,11 +34,9 @@ use crate::tables::expression::Value;
 /// Why a sliding joint is refused that no call of a toolbox makes.
 const SLIDES: &str = "a joint slides here, which only the calls of a toolbox (`Prismatic`), `type: prismatic` beside a link's parameters and a table's column `type` say of its row: write a table, a row a joint";
 
-/// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Text {
     pub links: Option<Links>,
-    /// What the words say.
     pub words: Words,
     /// The names that the text sets to numbers.
     pub known: Known,
@@ -51,9 +49,7 @@ pub struct Links {
     pub rows: Vec<(u64, [Value; 4])>,
     /// What the calls that make links or the numbers in names show, and how that is said.
     pub convention: Option<(Convention, &'static str)>,
-    /// How the calls contradict each other.
     pub contradiction: Option<String>,
-    /// Which joints slide.
     pub slides: Vec<bool>,
     /// Which joints count the other way.
     pub flipped: Vec<bool>,

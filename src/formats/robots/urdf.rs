@@ -22,7 +22,6 @@ use crate::tables::expression;
 pub enum Kind {
     /// Turns, with or without limits.
     Revolute,
-    /// Slides.
     Prismatic,
     /// Holds.
     Fixed,
@@ -53,7 +52,6 @@ pub struct UrdfJoint {
     origin_at: Result<std::ops::Range<usize>, usize>,
 }
 
-/// A description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Urdf {
     pub name: String,
@@ -93,7 +91,6 @@ impl Urdf {
         Urdf::parse(text, path)
     }
 
-    /// Understands the text of a file.
     pub fn parse(text: String, path: &Utf8Path) -> Result<Urdf> {
         let refuse = |line, message: String, hint| files::Error::format(path, line, message, hint);
         let text = without_declaration(text);

@@ -163,7 +163,6 @@ pub(in crate::measurements) fn usual(candidates: &[Picked], forced: Forced) -> V
     candidates.iter().flat_map(|picked| units.map(|units| way(picked, units))).collect()
 }
 
-/// Judges all ways.
 pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
     let guessed = |p: &Picked| p.columns().any(|at| unknown(&at));

@@ -77,7 +77,6 @@ pub(in crate::measurements) fn check_lengths(parts: &[Part], picked: &Picked, ro
     Ok(())
 }
 
-/// The unit that a column states.
 fn unit(parts: &[Part], at: &At) -> Option<Unit> {
     parts[at.part].meanings.as_ref()?[at.column].unit
 }
