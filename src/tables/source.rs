@@ -28,6 +28,7 @@ const SEEN: usize = 4096;
 pub(super) enum Source {
     /// Text, and its encoding where that is not UTF-8.
     Text(String, Option<&'static str>),
+    /// Records of JSON.
     Records(Vec<(u64, Fields)>),
     /// Rows of cells with their line, the sheet's name, and whether there are other sheets.
     Sheet { rows: Vec<(u64, Vec<String>)>, name: String, others: usize },
