@@ -142,18 +142,16 @@ pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -
         _ => &["csv", "xlsx"],
     };
     let rank = |path: &Utf8Path| likely.iter().position(|e| path.extension() == Some(*e)).unwrap_or(likely.len());
-    let mut names: Vec<(usize, String)> =
+    let mut all: Vec<(usize, String)> =
         files.map(|entry| (rank(entry.path()), format!("`{}`", entry.path()))).collect();
-    names.sort();
-    let mut names: Vec<String> = names.into_iter().map(|(_, name)| name).collect();
-    let others = names.len().saturating_sub(NAMED);
-    names.truncate(NAMED);
-    let hint = match (names.is_empty(), others) {
-        (true, _) => "name a file; this folder holds none that is read".to_owned(),
-        (false, 0) => format!("name a file in it: {}", names.join(", ")),
-        (false, more) => format!(
-            "name a file in it: {} and {more} more; of files that hold a pose each make one table first, a row a pose",
-            names.join(", ")
+    all.sort();
+    let names = all.iter().take(NAMED).map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let hint = match all.len() {
+        0 => "name a file; this folder holds none that is read".to_owned(),
+        count if count <= NAMED => format!("name a file in it: {names}"),
+        count => format!(
+            "name a file in it: {names} and {} more; of files that hold a pose each make one table first, a row a pose",
+            count - NAMED
         ),
     };
     Error::format(path, None, format!("{what}: this is a folder, and a file is needed"), Some(&hint))

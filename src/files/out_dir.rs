@@ -100,9 +100,8 @@ impl OutDir {
                 None => (),
             }
         }
-        let mut state = self.state();
+        let state = self.state.get_mut().unwrap_or_else(PoisonError::into_inner);
         (state.provenance, state.folders) = (provenance, folders);
-        drop(state);
         self
     }
 

@@ -91,8 +91,8 @@ impl Taken<'_> {
         let places = self.targets_as_readings();
         let own = self.own();
         let mut header: Vec<String> = ["pose", "group", "role"].map(str::to_owned).into();
-        let several = picked.points.len() > 1 && !places;
-        header.extend((several && !own.contains_key("target")).then(|| "target".to_owned()));
+        let several = picked.points.len() > 1 && !places && !own.contains_key("target");
+        header.extend(several.then(|| "target".to_owned()));
         header.extend(self.robot.joints.iter().enumerate().map(|(j, joint)| reading_name(j, joint.slides)));
         header.extend(match picked.distance {
             Some(_) => vec!["distance_mm".to_owned()],
@@ -110,7 +110,7 @@ impl Taken<'_> {
             for (k, (target, columns)) in measured.iter().enumerate() {
                 let repeated = (places && measured.len() > 1).then_some(k + 1);
                 let mut cells = self.named(row, repeated, &own);
-                cells.extend((several && !own.contains_key("target")).then(|| (*target).to_owned()));
+                cells.extend(several.then(|| (*target).to_owned()));
                 for (at, joint) in picked.joints.iter().zip(&self.robot.joints) {
                     let value = self.parts[at.part].number(row, at.column)?;
                     let reading = pick::reading(self.parts, at, joint, value, self.way.joints, self.way.lengths);
@@ -189,12 +189,9 @@ impl Taken<'_> {
         let files: Vec<String> = self.parts.iter().map(Part::file_name).collect();
         let count = self.count();
         let from = |columns: &[At]| {
-            let of = if self.parts.len() > 1 {
-                format!(" of {}", self.parts[columns[0].part].file_name())
-            } else {
-                String::new()
-            };
-            match self.parts[columns[0].part].is_program() {
+            let part = &self.parts[columns[0].part];
+            let of = if self.parts.len() > 1 { format!(" of {}", part.file_name()) } else { String::new() };
+            match part.is_program() {
                 true => format!("targets{of}"),
                 false => format!("{}{of}", listed(self.parts, columns)),
             }
@@ -225,12 +222,12 @@ impl Taken<'_> {
         );
         text.push_str(&self.form());
         let own = self.own();
-        let absent = |name: &str, says: &str| if own.contains_key(name) { String::new() } else { says.to_owned() };
-        text.push_str(&absent("pose", "; pose = row"));
-        text.push_str(&match self.number {
-            Some(number) if !own.contains_key("group") => format!("; group = {number}"),
-            _ => String::new(),
-        });
+        if !own.contains_key("pose") {
+            text.push_str("; pose = row");
+        }
+        if let Some(number) = self.number.filter(|_| !own.contains_key("group")) {
+            let _ = write!(text, "; group = {number}");
+        }
         text.push_str(&self.unused());
         text
     }

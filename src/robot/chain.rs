@@ -183,9 +183,7 @@ impl Robot {
         }
         self
     }
-}
 
-impl Robot {
     /// The flange in the root frame, both constant transforms included. One commanded reading a joint.
     pub fn root_from_flange(&self, joints: &[f64]) -> Transform {
         self.ends.root_from_frame0 * self.base_from_flange(joints) * self.ends.last_frame_from_flange
