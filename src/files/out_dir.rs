@@ -330,15 +330,6 @@ mod tests {
     }
 
     #[test]
-    fn an_input_is_never_replaced() {
-        let (_keep, path) = temporary_folder();
-        OutDir::open(&path).unwrap().write("robot.toml", b"1").unwrap();
-        let input = path.join("robot.toml");
-        let out = OutDir::open(&path).unwrap().for_run(&Run { force: true, ..Run::default() }, &[&input]);
-        assert!(matches!(out.write("robot.toml", b"1"), Err(Error::OverInput { .. })));
-    }
-
-    #[test]
     fn what_a_killed_run_left_is_swept_away() {
         let (_keep, path) = temporary_folder();
         std::fs::write(path.join(".stereocal-abcdef"), "half").unwrap();

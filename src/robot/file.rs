@@ -240,10 +240,8 @@ impl RobotRecord {
             return Err("a robot needs at least one [[joint]]".to_owned());
         }
         let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
-        let mut joints = Vec::with_capacity(self.joint.len());
-        for (i, j) in self.joint.iter().enumerate() {
-            joints.push(j.joint().map_err(|said| format!("joint {}: {said}", i + 1))?);
-        }
+        let joint = |(j, number): (&JointRecord, usize)| j.joint().map_err(|said| format!("joint {number}: {said}"));
+        let joints = self.joint.iter().zip(1..).map(joint).collect::<Result<Vec<Joint>, String>>()?;
         if tool_mm.iter().any(|v| !v.is_finite()) {
             return Err("[tool]: every number must be finite".to_owned());
         }

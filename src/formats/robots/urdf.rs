@@ -108,12 +108,12 @@ impl Urdf {
             let hint = "expand it first: `xacro FILE > robot.urdf`";
             return Err(refuse(None, "the file is a xacro, a description with macros in it".to_owned(), Some(hint)));
         }
+        let read = |node: Node| {
+            let line = u64::from(document.text_pos_at(node.range().start).row);
+            joint(&node, line).map_err(|message| refuse(Some(line), message, None))
+        };
         let elements = root.children().filter(|n| n.has_tag_name("joint"));
-        let line = |node: &Node| u64::from(document.text_pos_at(node.range().start).row);
-        let mut joints = Vec::new();
-        for node in elements {
-            joints.push(joint(&node, line(&node)).map_err(|message| refuse(Some(line(&node)), message, None))?);
-        }
+        let joints = elements.map(read).collect::<Result<Vec<UrdfJoint>>>()?;
         let links = root.children().filter(|n| n.has_tag_name("link")).filter_map(|n| n.attribute("name"));
         let roots: Vec<&str> = links.filter(|link| !joints.iter().any(|j| j.child == *link)).collect();
         let [root_link] = roots[..] else {

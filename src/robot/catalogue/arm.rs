@@ -69,20 +69,15 @@ impl Arm {
 pub fn from_rows(name: &str, convention: Convention, rows: &[Row]) -> Robot {
     let mut ends = Ends::default();
     let mut before = [0.0, 0.0];
-    let mut joints = Vec::with_capacity(rows.len());
-    for &[alpha_deg, a_mm, theta_deg, d_mm] in rows {
-        let [alpha, a] = match convention {
+    let joint = |&[alpha_deg, a_mm, theta_deg, d_mm]: &Row| {
+        let [alpha, a_mm] = match convention {
             Convention::Modified => [alpha_deg, a_mm],
             Convention::Classic => std::mem::replace(&mut before, [alpha_deg, a_mm]),
         };
-        joints.push(Joint {
-            alpha_rad: alpha.to_radians(),
-            a_mm: a,
-            theta_rad: theta_deg.to_radians(),
-            d_mm,
-            ..Joint::default()
-        });
-    }
+        let (alpha_rad, theta_rad) = (alpha.to_radians(), theta_deg.to_radians());
+        Joint { alpha_rad, a_mm, theta_rad, d_mm, ..Joint::default() }
+    };
+    let joints = rows.iter().map(joint).collect();
     if convention == Convention::Classic && before != [0.0, 0.0] {
         let along: Transform = Transform::translation(before[1], 0.0, 0.0);
         ends.last_frame_from_flange = along * transform(Vector3::x() * before[0].to_radians(), Vector3::zeros());
