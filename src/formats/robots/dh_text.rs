@@ -14,7 +14,6 @@ mod ends;
 mod link;
 mod lists;
 mod matrix;
-mod numbered;
 mod repeated;
 mod robots;
 mod scan;
@@ -95,7 +94,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
     let Scan { mut links, lists, families, numbered, wrong, .. } = scan;
     let others = || -> Result<(Vec<Link>, Option<Convention>), Wrong> {
         let of_lists = lists::links(&lists, &families)?;
-        Ok(if of_lists.is_empty() { numbered::links(&numbered) } else { (of_lists, None) })
+        Ok(if of_lists.is_empty() { lists::numbered_links(&numbered) } else { (of_lists, None) })
     };
     // What a loop takes out of lists is no number where the link is made.
     if let Some(wrong) = wrong {
