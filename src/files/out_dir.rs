@@ -197,20 +197,15 @@ impl OutDir {
 
     /// Writes indented JSON with a final newline, its provenance last, and returns its text.
     pub fn write_json<T: Serialize>(&self, name: &str, value: &T) -> Result<String> {
-        let text = self.json(value);
-        self.write(name, text.as_bytes())?;
-        Ok(text)
-    }
-
-    /// A value as JSON with its provenance.
-    fn json<T: Serialize>(&self, value: &T) -> String {
-        match (serde_json::to_value(value), serde_json::to_value(self.provenance())) {
+        let text = match (serde_json::to_value(value), serde_json::to_value(self.provenance())) {
             (Ok(serde_json::Value::Object(mut object)), Ok(provenance)) if !provenance.is_null() => {
                 object.insert(KEY.to_owned(), provenance);
                 to_json(&object)
             }
             _ => to_json(value),
-        }
+        };
+        self.write(name, text.as_bytes())?;
+        Ok(text)
     }
 
     /// Writes a TOML file, its provenance as comments before it.

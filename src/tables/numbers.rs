@@ -81,14 +81,8 @@ fn bare(cell: &str) -> String {
 
 /// A number whose digits are set apart in threes, without what sets them apart and with its decimals as they are but for the point.
 fn ungrouped(cell: &str, by: char, decimal: char) -> Option<String> {
-    let (sign, rest) = match cell.strip_prefix(['+', '-']) {
-        Some(rest) => (&cell[..1], rest),
-        None => ("", cell),
-    };
-    let (whole, decimals) = match rest.split_once(decimal) {
-        Some((whole, decimals)) => (whole, Some(decimals)),
-        None => (rest, None),
-    };
+    let (sign, rest) = cell.split_at(usize::from(cell.starts_with(['+', '-'])));
+    let (whole, decimals) = rest.split_once(decimal).map_or((rest, None), |(whole, behind)| (whole, Some(behind)));
     let mut groups = whole.split(by);
     let first = groups.next()?;
     let digits = |text: &str| text.chars().all(|c| c.is_ascii_digit());
