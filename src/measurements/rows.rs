@@ -249,10 +249,9 @@ pub(super) fn from_table(table: &Table) -> Result<Vec<Measurement>> {
         let line = *line;
         let numbers =
             |columns: &[usize]| columns.iter().map(|&c| table.number(line, row, c)).collect::<Result<Vec<_>>>();
-        let optional = |columns: &Option<Vec<usize>>| match columns {
-            Some(columns) if !columns.iter().all(|&c| row[c].is_empty()) => numbers(columns).map(Some),
-            _ => Ok(None),
-        };
+        let filled = |columns: &&Vec<usize>| !columns.iter().all(|&c| row[c].is_empty());
+        let optional =
+            |columns: &Option<Vec<usize>>| columns.as_ref().filter(filled).map(|columns| numbers(columns)).transpose();
         let said = status.map_or("ok", |c| &row[c]);
         let observed = if !(said.is_empty() || said == "ok") {
             Observed::Missing { reason: said.to_owned() }

@@ -68,10 +68,8 @@ impl Table<'_> {
         let slides = self.sliding()?;
         let (mut beta_deg, mut limits_deg) = (Vec::new(), Vec::new());
         for (line, row) in self.rows {
-            let of = |column: Option<usize>| match column.filter(|&c| !row[c].is_empty()) {
-                Some(column) => self.number(*line, row, column).map(|v| Some(v.number)),
-                None => Ok(None),
-            };
+            let number = |column: usize| self.number(*line, row, column).map(|v| v.number);
+            let of = |column: Option<usize>| column.filter(|&c| !row[c].is_empty()).map(number).transpose();
             beta_deg.push(of(beta)?);
             limits_deg.push(match (of(bounds.map(|b| b.0))?, of(bounds.map(|b| b.1))?, bounds) {
                 (Some(low), Some(high), Some((of_low, of_high))) if low >= high => {
