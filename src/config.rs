@@ -36,10 +36,7 @@ pub enum Error {
 
 impl Explain for Error {
     fn place(&self) -> Option<String> {
-        match self {
-            Error::Files(e) => e.place(),
-            Error::Invalid { .. } | Error::Usage { .. } => None,
-        }
+        if let Error::Files(e) = self { e.place() } else { None }
     }
     fn hint(&self) -> Option<String> {
         match self {
@@ -91,18 +88,15 @@ struct BoardFields {
 impl BoardFields {
     /// The board of a section, where it is not empty.
     fn settings(self, default: BoardSettings) -> Result<BoardSettings, &'static str> {
-        match self {
-            BoardFields { board: None, squares: None, square_mm: None } => Ok(default),
-            BoardFields { board: Some(NamedBoard(board)), squares: None, square_mm: None } => {
-                Ok(BoardSettings::said(board))
-            }
-            BoardFields { board: Some(_), .. } => Err("`board` says squares and size already: it stands alone"),
-            BoardFields { board: None, squares: None, .. } => Err("missing field `squares`, or `board`"),
-            BoardFields { board: None, square_mm: None, .. } => Err("missing field `square_mm`"),
-            BoardFields { squares: Some(squares), square_mm: Some(mm), .. } => {
-                Ok(BoardSettings::said(Board::checker(squares, mm)))
-            }
-        }
+        let board = match (self.board, self.squares, self.square_mm) {
+            (None, None, None) => return Ok(default),
+            (Some(NamedBoard(board)), None, None) => board,
+            (None, Some(squares), Some(mm)) => Board::checker(squares, mm),
+            (Some(_), ..) => return Err("`board` says squares and size already: it stands alone"),
+            (None, None, _) => return Err("missing field `squares`, or `board`"),
+            (None, _, None) => return Err("missing field `square_mm`"),
+        };
+        Ok(BoardSettings { board, is_assumed: false })
     }
 }
 
@@ -130,10 +124,6 @@ impl Default for MeasureSettings {
 }
 
 impl BoardSettings {
-    fn said(board: Board) -> BoardSettings {
-        BoardSettings { board, is_assumed: false }
-    }
-
     fn assumed(columns: usize, rows: usize) -> BoardSettings {
         BoardSettings { board: Board::checker(Squares { columns, rows }, 10.0), is_assumed: true }
     }

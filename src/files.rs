@@ -4,7 +4,6 @@ mod io;
 pub mod kind;
 pub mod out_dir;
 pub mod provenance;
-mod refusal;
 
 pub use io::*;
 pub use out_dir::{OutDir, or_usual};

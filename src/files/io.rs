@@ -8,7 +8,6 @@ use serde::de::DeserializeOwned;
 use serde_json::error::Category;
 
 use super::kind::kind;
-use super::refusal::plain;
 use crate::diagnostic::{Explain, Place};
 
 /// Result of reading or writing a file.
@@ -75,8 +74,8 @@ impl Explain for Error {
     fn place(&self) -> Option<String> {
         match self {
             Error::Missing { path, .. } => Some(path.to_string()),
-            Error::Io { .. } | Error::OverInput { .. } | Error::OverForeign { .. } => None,
             Error::Format { place, .. } => Some(place.to_string()),
+            _ => None,
         }
     }
     fn hint(&self) -> Option<String> {
@@ -102,27 +101,18 @@ const MOST_TEXT_BYTES: u64 = 64 << 20;
 
 /// Reads a text file; `what` names it in the message when it is not there, `hint` says what makes it.
 pub fn read_text(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<String> {
-    read_text_up_to(path, what, hint, MOST_TEXT_BYTES)
-}
-
-/// Reads a text file of a size that the caller thinks possible; a longer one is refused, and never read to its end.
-pub fn read_text_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<String> {
     let not_text = |_| Error::format(path, None, format!("{what}: not UTF-8 text"), None);
-    String::from_utf8(read_bytes_up_to(path, what, hint, most_bytes)?).map_err(not_text)
+    String::from_utf8(read_text_bytes(path, what, hint)?).map_err(not_text)
 }
 
-/// Reads a text file in whatever encoding.
-pub fn read_text_bytes(path: &Utf8Path, what: &'static str) -> Result<Vec<u8>> {
-    read_bytes_up_to(path, what, None, MOST_TEXT_BYTES)
-}
-
-fn read_bytes_up_to(path: &Utf8Path, what: &'static str, hint: Option<&str>, most_bytes: u64) -> Result<Vec<u8>> {
+/// Reads a text file in whatever encoding; one that is too long is never read to its end.
+pub fn read_text_bytes(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    let read = std::fs::File::open(path).and_then(|file| file.take(most_bytes + 1).read_to_end(&mut bytes));
-    let refuse = |message: String| Error::format(path, None, message, None);
+    let read = std::fs::File::open(path).and_then(|file| file.take(MOST_TEXT_BYTES + 1).read_to_end(&mut bytes));
     match read {
-        Ok(_) if bytes.len() as u64 > most_bytes => {
-            Err(refuse(format!("{what}: more than {} MB of text; no such file is that long", most_bytes >> 20)))
+        Ok(_) if bytes.len() as u64 > MOST_TEXT_BYTES => {
+            let message = format!("{what}: more than {} MB of text; no such file is that long", MOST_TEXT_BYTES >> 20);
+            Err(Error::format(path, None, message, None))
         }
         Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
@@ -151,18 +141,16 @@ pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -
         _ => &["csv", "xlsx"],
     };
     let rank = |path: &Utf8Path| likely.iter().position(|e| path.extension() == Some(*e)).unwrap_or(likely.len());
-    let mut names: Vec<(usize, String)> =
+    let mut all: Vec<(usize, String)> =
         files.map(|entry| (rank(entry.path()), format!("`{}`", entry.path()))).collect();
-    names.sort();
-    let mut names: Vec<String> = names.into_iter().map(|(_, name)| name).collect();
-    let others = names.len().saturating_sub(NAMED);
-    names.truncate(NAMED);
-    let hint = match (names.is_empty(), others) {
-        (true, _) => "name a file; this folder holds none that is read".to_owned(),
-        (false, 0) => format!("name a file in it: {}", names.join(", ")),
-        (false, more) => format!(
-            "name a file in it: {} and {more} more; of files that hold a pose each make one table first, a row a pose",
-            names.join(", ")
+    all.sort();
+    let names = all.iter().take(NAMED).map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ");
+    let hint = match all.len() {
+        0 => "name a file; this folder holds none that is read".to_owned(),
+        count if count <= NAMED => format!("name a file in it: {names}"),
+        count => format!(
+            "name a file in it: {names} and {} more; of files that hold a pose each make one table first, a row a pose",
+            count - NAMED
         ),
     };
     Error::format(path, None, format!("{what}: this is a folder, and a file is needed"), Some(&hint))
@@ -212,6 +200,53 @@ pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
     })
 }
 
+/// A message of the readers of JSON and TOML in the words of the file's format, as their own name types of the source; without the place, which is said
+/// apart.
+fn plain(message: &str) -> String {
+    let message = message.split(" at line ").next().unwrap_or(message);
+    let prefixed = |prefix: &str| message.strip_prefix(prefix);
+    if let Some(key) = prefixed("missing field ") {
+        return format!("{key} is missing");
+    }
+    if let Some((key, known)) = prefixed("unknown field ").and_then(|rest| rest.split_once(", expected ")) {
+        return format!("unknown key {key}; there are {}", known.trim_start_matches("one of "));
+    }
+    if let Some(key) = prefixed("duplicate field ") {
+        return format!("{key} stands there twice");
+    }
+    let of_type = prefixed("invalid type: ").or(prefixed("invalid value: "));
+    if let Some((found, needed)) = of_type.and_then(|rest| rest.split_once(", expected ")) {
+        return format!("{} stands where {} is needed", found_in_words(found), needed_in_words(needed));
+    }
+    if let Some((found, needed)) = prefixed("invalid length ").and_then(|rest| rest.split_once(", expected ")) {
+        return format!("{found} values stand where {} is needed", needed_in_words(needed));
+    }
+    message.to_owned()
+}
+
+fn found_in_words(found: &str) -> String {
+    match found {
+        "sequence" => "a list".to_owned(),
+        "map" => "a table of keys".to_owned(),
+        "null" => "`null`".to_owned(),
+        other => ["integer", "floating point", "boolean"].iter().fold(other.to_owned(), |said, kind| {
+            said.strip_prefix(&format!("{kind} ")).map_or(said.clone(), str::to_owned)
+        }),
+    }
+}
+
+fn needed_in_words(needed: &str) -> String {
+    match needed {
+        "f64" | "f32" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number".to_owned(),
+        "a string" | "string" => "text in quotes".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a sequence" => "a list".to_owned(),
+        other if other.starts_with("struct ") || other == "a map" => "a table of keys".to_owned(),
+        other => other.strip_prefix("an array of length ").map_or(other.to_owned(), |n| format!("a list of {n}")),
+    }
+}
+
 /// Indented JSON with a final newline. Numbers that are not finite become `null`.
 pub fn to_json<T: Serialize>(value: &T) -> String {
     // Serialisation of this crate's plain structs (string keys, no I/O) has no way to fail.
@@ -240,13 +275,13 @@ pub fn is_temporary(name: &str) -> bool {
 /// Writes a file whole or not at all, making its folder where needed: to a temporary name beside it, then renamed.
 pub fn write_atomically(path: &Utf8Path, bytes: &[u8], durability: Durability) -> Result<()> {
     let io = |source| Error::Io { action: "write", path: path.to_owned(), source: without_path(source) };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_str().is_empty() => folder,
-        _ => Utf8Path::new("."),
-    };
+    let folder = path.parent().filter(|folder| !folder.as_str().is_empty()).unwrap_or(Utf8Path::new("."));
     std::fs::create_dir_all(folder).map_err(io)?;
-    let mut file =
-        tempfile::Builder::new().prefix(TEMPORARY).permissions_like_others().tempfile_in(folder).map_err(io)?;
+    let mut builder = tempfile::Builder::new();
+    // Temporary files are private by default; results are meant to be read by colleagues (the umask still applies).
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file = builder.prefix(TEMPORARY).tempfile_in(folder).map_err(io)?;
     file.write_all(bytes).map_err(io)?;
     if durability == Durability::Synced {
         file.as_file().sync_all().map_err(io)?;
@@ -270,22 +305,6 @@ fn sync_folder(folder: &Utf8Path) -> std::io::Result<()> {
     match std::fs::File::open(folder).and_then(|folder| folder.sync_all()) {
         Err(e) if matches!(e.kind(), InvalidInput | PermissionDenied | Unsupported) => Ok(()),
         done => done,
-    }
-}
-
-trait PermissionsLikeOthers {
-    fn permissions_like_others(&mut self) -> &mut Self;
-}
-
-impl PermissionsLikeOthers for tempfile::Builder<'_, '_> {
-    /// Temporary files are private by default; results are meant to be read by colleagues (the umask still applies).
-    fn permissions_like_others(&mut self) -> &mut Self {
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            self.permissions(std::fs::Permissions::from_mode(0o666));
-        }
-        self
     }
 }
 
@@ -343,5 +362,28 @@ mod tests {
             |action| Error::Io { action, path: "x".into(), source: std::io::ErrorKind::PermissionDenied.into() };
         assert!(refused("read").hint().is_some_and(|hint| hint.contains("chmod -R u+rX x")));
         assert!(refused("write").hint().is_some_and(|hint| hint.contains("--out DIR")));
+    }
+
+    #[test]
+    fn readers_are_quoted_without_the_types_of_the_source() {
+        for (message, said) in [
+            ("missing field `fx` at line 18 column 3", "`fx` is missing"),
+            ("unknown field `b_mm`, expected one of `a_mm`, `d_mm`", "unknown key `b_mm`; there are `a_mm`, `d_mm`"),
+            ("duplicate field `name`", "`name` stands there twice"),
+            (
+                "invalid type: string \"a\", expected f64 at line 6 column 13",
+                "string \"a\" stands where a number is needed",
+            ),
+            ("invalid type: integer `3`, expected a string", "`3` stands where text in quotes is needed"),
+            ("invalid type: sequence, expected f64", "a list stands where a number is needed"),
+            ("invalid length 2, expected an array of length 3", "2 values stand where a list of 3 is needed"),
+            (
+                "invalid length 0, expected struct File with 12 elements",
+                "0 values stand where a table of keys is needed",
+            ),
+            ("key with no value, expected `=`", "key with no value, expected `=`"),
+        ] {
+            assert_eq!(plain(message), said);
+        }
     }
 }

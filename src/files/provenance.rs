@@ -177,15 +177,10 @@ impl Digested {
 
 /// The pictures of a folder and of its `left/` and `right/`, in the order of their names.
 pub fn pictures(folder: &Utf8Path) -> Vec<Utf8PathBuf> {
-    let mut found = Vec::new();
-    for folder in [folder.to_owned(), folder.join("left"), folder.join("right")] {
-        for entry in folder.read_dir_utf8().into_iter().flatten().flatten() {
-            let path = entry.path();
-            if picture_format(path).is_some() && path.is_file() {
-                found.push(path.to_owned());
-            }
-        }
-    }
+    let folders = [folder.to_owned(), folder.join("left"), folder.join("right")];
+    let entries = folders.iter().flat_map(|folder| folder.read_dir_utf8()).flatten().flatten();
+    let is_picture = |path: &Utf8PathBuf| picture_format(path).is_some() && path.is_file();
+    let mut found: Vec<Utf8PathBuf> = entries.map(|entry| entry.into_path()).filter(is_picture).collect();
     found.sort();
     found
 }

@@ -86,7 +86,6 @@ pub struct Check {
 #[derive(Debug, Clone)]
 pub struct Calibrated {
     pub rig: Rig,
-    /// How corners scattered.
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: Option<f64>,
@@ -248,10 +247,6 @@ impl CalibrationFile {
         self
     }
 
-    fn board(&self) -> Option<Board> {
-        self.board.as_ref()?.parse().ok()
-    }
-
     fn noise(&self) -> Option<Noise> {
         let noise =
             self.corner_noise.filter(|n| n.factor >= 0.0 && n.added_px >= 0.0 && n.factor + n.added_px > 0.0)?;
@@ -319,20 +314,16 @@ pub fn file(named: Option<&Utf8Path>, out: &Utf8Path, usual: &Utf8Path) -> Resul
         return Ok(named.to_owned());
     }
     let there = |name: &&str| named.join(name).is_file();
-    let found: Vec<&str> = match [OWN_NAME].iter().copied().find(there) {
-        Some(own) => vec![own],
-        None => export::NAMES.into_iter().filter(there).collect(),
-    };
-    match found[..] {
-        [one] => Ok(named.join(one)),
-        _ => {
-            let message = match found[..] {
-                [] => format!("no calibration in this folder: neither {OWN_NAME} nor {}", export::NAMES.join(", ")),
-                _ => format!("this folder holds several calibrations: {}", found.join(", ")),
-            };
-            Err(files::Error::format(named, None, message, Some("name the file: `--calibration FILE`")))
-        }
+    if there(&OWN_NAME) {
+        return Ok(named.join(OWN_NAME));
     }
+    let found: Vec<&str> = export::NAMES.into_iter().filter(there).collect();
+    let message = match found[..] {
+        [one] => return Ok(named.join(one)),
+        [] => format!("no calibration in this folder: neither {OWN_NAME} nor {}", export::NAMES.join(", ")),
+        _ => format!("this folder holds several calibrations: {}", found.join(", ")),
+    };
+    Err(files::Error::format(named, None, message, Some("name the file: `--calibration FILE`")))
 }
 
 /// Reads `calibration.json` with what it says beside the rig, or one of the formats that [`crate::formats::export`] writes.
@@ -356,7 +347,7 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),
         pairs: file.corner_noise.and_then(|n| n.pairs),
-        board: file.board(),
+        board: file.board.as_ref().and_then(|name| name.parse().ok()),
         volume: file.volume,
         check: file.check,
         unconfirmed: file.unconfirmed,

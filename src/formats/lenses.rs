@@ -38,15 +38,10 @@ impl FromStr for LensFile {
 
 /// Reads them all; of two that are for one side the later counts.
 pub fn read(named: &[LensFile]) -> Result<Option<KnownLenses>> {
-    let mut known: Option<KnownLenses> = None;
-    for file in named {
-        let next = read_one(file)?;
-        known = Some(known.map_or(next.clone(), |known| known.and(next)));
-    }
-    Ok(known)
+    let all = named.iter().map(read_one).collect::<Result<Vec<KnownLenses>>>()?;
+    Ok(all.into_iter().reduce(KnownLenses::and))
 }
 
-/// What the flag takes.
 const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
 
 fn read_one(file: &LensFile) -> Result<KnownLenses> {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use nalgebra::{Point3, Vector3};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::geometry::rotation_vector;
 use crate::imaging::{Board, Corners};
@@ -11,6 +12,7 @@ use crate::linear_algebra::rows;
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
 use crate::stereo::Rig;
+use crate::stereo::board_pose::rig_change::cause::Explanation;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, Shared, TargetPose};
 use crate::stereo::volume::Volume;
@@ -31,7 +33,6 @@ const UNUSUAL_NOISE: f64 = 2.0;
 /// Poses that disagree with one rig by this many times chance are worth a warning.
 const UNUSUAL_EXCESS: f64 = 2.25;
 
-/// The content of `measure.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MeasureFile {
     /// Crossings of the target in a row.
@@ -43,8 +44,7 @@ pub struct MeasureFile {
     pub poses: usize,
     /// See `poses`.
     pub measured: usize,
-    /// "agrees", "allowed", "contradicts", "exchanged", "moved", "unexplained".
-    rig: RigRecord,
+    rig: Value,
     /// Chi-square a number over all poses, against the calibration's noise where that is known.
     chi_square: Option<f64>,
     /// Standard deviation of a corner's coordinate, px.
@@ -57,93 +57,15 @@ pub struct MeasureFile {
     pub reprojection_rms_px: Option<f64>,
     /// Median standard deviation of the mark point along x, y, z, mm.
     pub sigma_mm: Option<[f64; 3]>,
-    results: Vec<Row>,
-    missing: Vec<Missing>,
+    results: Vec<Value>,
+    missing: Vec<Value>,
     /// What a person should look at.
     pub warnings: Vec<String>,
-    target_shape: Option<ShapeRecord>,
-    shared: Option<SharedRecord>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct RigRecord {
-    state: &'static str,
-    statement: Option<String>,
-    /// Chi-square of the calibration and of the target's size, and its degrees of freedom.
-    chi_square: Option<f64>,
-    degrees_of_freedom: Option<f64>,
-    /// How much larger the poses' disagreement with the common rig is than chance.
-    excess: f64,
-    /// The same at the calibration, in units of the noise here.
-    usual_excess: f64,
-    changes: Vec<ChangeRecord>,
-    /// First pose after the rig moved.
-    moved_before: Option<String>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ChangeRecord {
-    what: String,
-    amount: f64,
-    unit: &'static str,
-    sigma: f64,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Row {
-    pose: String,
-    status: String,
-    reason: Option<String>,
-    chi_square: Option<f64>,
-    corners: usize,
-    outliers: usize,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Missing {
-    pose: String,
-    reason: String,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct ShapeRecord {
-    /// How far crossings scatter, mm: a coordinate in the plane, and the height.
-    in_plane_mm: f64,
-    out_of_plane_mm: f64,
-    /// Size against the drawing, minus one.
-    scale_error: f64,
-    scale_error_sigma: f64,
-    crossings: Vec<CrossingRecord>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct CrossingRecord {
-    col: usize,
-    row: usize,
-    dx_mm: f64,
-    dy_mm: f64,
-    dz_mm: f64,
-    sigma_x_mm: f64,
-    sigma_y_mm: f64,
-    sigma_z_mm: f64,
-}
-
-/// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`, rows in the order
-/// of `rows`, columns in that of `parameters`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct SharedRecord {
-    parameters: Vec<String>,
-    /// Found, minus calibrated or drawn.
-    change: Vec<f64>,
-    covariance: Vec<Vec<f64>>,
-    rows: [&'static str; 6],
-    poses: Vec<SensitivityRecord>,
-}
-
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct SensitivityRecord {
-    pose: String,
-    sensitivity: Vec<Vec<f64>>,
+    target_shape: Option<Value>,
+    shared: Option<Value>,
+    /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
+    #[serde(skip)]
+    pub chi_square_is_usual: bool,
 }
 
 impl MeasureFile {
@@ -155,9 +77,7 @@ impl MeasureFile {
             crate::stereo::data::residuals::root_mean_square(squares)
         };
         let sigma = |axis: usize| median(targets.iter().map(|t| t.covariance[(3 + axis, 3 + axis)].sqrt()));
-        let missing = |m: &MeasuredPose| {
-            Some(Missing { pose: m.at.pose.clone(), reason: m.target.as_ref().err()?.reason.clone() })
-        };
+        let missing = |m: &MeasuredPose| Some(json!({"pose": m.at.pose, "reason": m.target.as_ref().err()?.reason}));
         let mut warnings = corners.notes.clone();
         warnings.extend(series.notes.iter().cloned());
         warnings.extend(series.judgement.describe(rig, board));
@@ -170,7 +90,7 @@ impl MeasureFile {
             square_mm: board.square_mm,
             poses: series.poses.len(),
             measured: targets.len(),
-            rig: RigRecord::new(series, board, rig),
+            rig: rig_record(series, board, rig),
             chi_square: series.chi_square,
             corner_noise_px: series.noise_px,
             calibration_noise_px: series.usual_px,
@@ -182,94 +102,88 @@ impl MeasureFile {
             warnings,
             target_shape: series.shape.as_ref().map(|shape| shape_record(shape, board)),
             shared: series.shared.as_ref().map(|shared| shared_record(shared, &series.poses)),
-        }
-    }
-
-    /// True where neither the corners' scatter nor the poses' disagreement is beyond what was known before.
-    pub fn chi_square_is_usual(&self) -> bool {
-        self.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE)
-            && self.rig.excess <= UNUSUAL_EXCESS * self.rig.usual_excess
-    }
-}
-
-impl RigRecord {
-    fn new(series: &Series, board: &Board, rig: &Rig) -> RigRecord {
-        let (state, changes, moved_before) = match &series.judgement {
-            Judgement::Agrees => ("agrees", &[][..], None),
-            Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
-            Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
-            Judgement::Exchanged => ("exchanged", &[][..], None),
-            Judgement::Mirrored(_) => ("mirrored", &[][..], None),
-            Judgement::Moved { since, .. } => ("moved", &[][..], Some(since.clone())),
-            Judgement::Loose { .. } => ("loose", &[][..], None),
-            Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
-        };
-        let change = |e: &crate::stereo::board_pose::rig_change::cause::Explanation| ChangeRecord {
-            what: e.describe(rig, board),
-            amount: e.amount,
-            unit: e.cause.unit(),
-            sigma: e.sigma,
-        };
-        RigRecord {
-            state,
-            statement: series.judgement.describe(rig, board),
-            chi_square: series.prior_chi_square.map(|c| c[0]),
-            degrees_of_freedom: series.prior_chi_square.map(|c| c[1]),
-            excess: series.excess,
-            usual_excess: series.usual_excess,
-            changes: changes.iter().map(change).collect(),
-            moved_before,
+            chi_square_is_usual: series.chi_square.is_some_and(|chi| chi <= UNUSUAL_NOISE * UNUSUAL_NOISE)
+                && series.excess <= UNUSUAL_EXCESS * series.usual_excess,
         }
     }
 }
 
-fn row(m: &MeasuredPose) -> Row {
-    let target = m.target.as_ref();
-    Row {
-        pose: m.at.pose.clone(),
-        status: target.map_or_else(|refusal| refusal.status.to_owned(), |_| "ok".to_owned()),
-        reason: target.err().map(|refusal| refusal.reason.clone()),
-        chi_square: target.ok().map(|t| t.chi_square),
-        corners: target.map_or(0, |t| t.corners),
-        outliers: target.map_or(0, |t| t.outliers),
-    }
-}
-
-fn shape_record(shape: &Shape, board: &Board) -> ShapeRecord {
-    let crossing = |(k, (d, s)): (usize, (&Vector3<f64>, &Vector3<f64>))| CrossingRecord {
-        col: board.place(k).0,
-        row: board.place(k).1,
-        dx_mm: d.x,
-        dy_mm: d.y,
-        dz_mm: d.z,
-        sigma_x_mm: s.x,
-        sigma_y_mm: s.y,
-        sigma_z_mm: s.z,
+fn rig_record(series: &Series, board: &Board, rig: &Rig) -> Value {
+    let (state, changes, moved_before) = match &series.judgement {
+        Judgement::Agrees => ("agrees", &[][..], None),
+        Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
+        Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
+        Judgement::Exchanged => ("exchanged", &[][..], None),
+        Judgement::Mirrored(_) => ("mirrored", &[][..], None),
+        // The first pose after the rig moved.
+        Judgement::Moved { since, .. } => ("moved", &[][..], Some(since)),
+        Judgement::Loose { .. } => ("loose", &[][..], None),
+        Judgement::Unexplained { .. } => ("unexplained", &[][..], None),
     };
-    ShapeRecord {
-        in_plane_mm: shape.in_plane_mm,
-        out_of_plane_mm: shape.out_of_plane_mm,
-        scale_error: shape.stretch[0],
-        scale_error_sigma: shape.stretch[1],
-        crossings: shape.deviations_mm.iter().zip(&shape.sigma_mm).enumerate().map(crossing).collect(),
-    }
+    let change = |e: &Explanation| json!({"what": e.describe(rig, board), "amount": e.amount, "unit": e.cause.unit(), "sigma": e.sigma});
+    json!({
+        "state": state,
+        "statement": series.judgement.describe(rig, board),
+        // Of the calibration and of the target's size.
+        "chi_square": series.prior_chi_square.map(|c| c[0]),
+        "degrees_of_freedom": series.prior_chi_square.map(|c| c[1]),
+        // How much larger the poses' disagreement with the common rig is than chance; and at the calibration, in units of the noise here.
+        "excess": series.excess,
+        "usual_excess": series.usual_excess,
+        "changes": changes.iter().map(change).collect::<Vec<_>>(),
+        "moved_before": moved_before,
+    })
 }
 
-fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> SharedRecord {
+fn row(m: &MeasuredPose) -> Value {
+    let target = m.target.as_ref();
+    json!({
+        "pose": m.at.pose,
+        "status": target.map_or_else(|refusal| refusal.status, |_| "ok"),
+        "reason": target.err().map(|refusal| &refusal.reason),
+        "chi_square": target.ok().map(|t| t.chi_square),
+        "corners": target.map_or(0, |t| t.corners),
+        "outliers": target.map_or(0, |t| t.outliers),
+    })
+}
+
+fn shape_record(shape: &Shape, board: &Board) -> Value {
+    let crossing = |(k, (d, s)): (usize, (&Vector3<f64>, &Vector3<f64>))| {
+        let (col, row) = board.place(k);
+        json!({
+            "col": col, "row": row, "dx_mm": d.x, "dy_mm": d.y, "dz_mm": d.z,
+            "sigma_x_mm": s.x, "sigma_y_mm": s.y, "sigma_z_mm": s.z,
+        })
+    };
+    let crossings = shape.deviations_mm.iter().zip(&shape.sigma_mm).enumerate().map(crossing);
+    json!({
+        // How far crossings scatter: a coordinate in the plane, and the height.
+        "in_plane_mm": shape.in_plane_mm,
+        "out_of_plane_mm": shape.out_of_plane_mm,
+        // Size against the drawing, minus one.
+        "scale_error": shape.stretch[0],
+        "scale_error_sigma": shape.stretch[1],
+        "crossings": crossings.collect::<Vec<_>>(),
+    })
+}
+
+/// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`, rows in the order
+/// of `rows`, columns in that of `parameters`.
+fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> Value {
     let of = |m: &MeasuredPose| {
-        let by_shared = &m.target.as_ref().ok()?.sensitivity;
-        let mut sensitivity = rows(by_shared);
+        let mut sensitivity = rows(&m.target.as_ref().ok()?.sensitivity);
         // Turns stand first inside, points in files.
         sensitivity.rotate_left(3);
-        Some(SensitivityRecord { pose: m.at.pose.clone(), sensitivity })
+        Some(json!({"pose": m.at.pose, "sensitivity": sensitivity}))
     };
-    SharedRecord {
-        parameters: shared.parameters.clone(),
-        change: shared.change.clone(),
-        covariance: rows(&shared.covariance),
-        rows: ORDER,
-        poses: poses.iter().filter_map(of).collect(),
-    }
+    json!({
+        "parameters": shared.parameters,
+        // Found, minus calibrated or drawn.
+        "change": shared.change,
+        "covariance": rows(&shared.covariance),
+        "rows": ORDER,
+        "poses": poses.iter().filter_map(of).collect::<Vec<_>>(),
+    })
 }
 
 /// Pictures whose corners scatter more than the calibration's did.

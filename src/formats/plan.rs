@@ -1,11 +1,13 @@
 //! `plan.json`: a plan as a file.
 
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::geometry::rotation_matrix;
 use crate::linear_algebra::rows;
 use crate::plan::Plan;
 use crate::plan::predict::Accuracy;
+use crate::plan::scene::Placement;
 
 /// The accuracy with so many samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,25 +28,6 @@ pub struct Determined {
     pub expected: Vec<Expected>,
 }
 
-/// The placement of the cameras that a group was planned for.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Group {
-    pub group: String,
-    /// Middle of its sphere, base frame, mm.
-    pub center_mm: [f64; 3],
-    /// Where the left camera was assumed.
-    pub cam_from_base: CamFromBase,
-    pub poses: usize,
-}
-
-/// A rigid transform.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CamFromBase {
-    pub rotation: Vec<Vec<f64>>,
-    pub translation_mm: [f64; 3],
-}
-
-/// `plan.json`
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanFile {
     #[serde(flatten)]
@@ -55,21 +38,27 @@ pub struct PlanFile {
     pub paper: Option<Determined>,
     /// Candidates that were chosen from.
     pub pool: usize,
-    pub groups: Vec<Group>,
+    /// The placement of the cameras that each group was planned for.
+    groups: Vec<Value>,
     /// What is not checked or only assumed.
     pub warnings: Vec<String>,
 }
 
 impl PlanFile {
     pub fn new(plan: &Plan) -> PlanFile {
-        let group = |(k, placement): (usize, &crate::plan::scene::Placement)| Group {
-            group: placement.name.clone(),
-            center_mm: placement.center_mm.into(),
-            cam_from_base: CamFromBase {
-                rotation: rows(&rotation_matrix(&placement.left_from_base)),
-                translation_mm: placement.left_from_base.translation.vector.into(),
-            },
-            poses: plan.poses.iter().filter(|p| p.group == k).count(),
+        let group = |(k, placement): (usize, &Placement)| {
+            let from_base = &placement.left_from_base;
+            json!({
+                "group": placement.name,
+                // Middle of its sphere, base frame.
+                "center_mm": placement.center_mm.as_slice(),
+                // Where the left camera was assumed.
+                "cam_from_base": {
+                    "rotation": rows(&rotation_matrix(from_base)),
+                    "translation_mm": from_base.translation.vector.as_slice(),
+                },
+                "poses": plan.poses.iter().filter(|p| p.group == k).count(),
+            })
         };
         PlanFile {
             plan: determined(&plan.accuracy, &plan.expected),

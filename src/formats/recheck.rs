@@ -5,9 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::diagnostic::Status;
 use crate::files::{self, OutDir, Result};
-use crate::imaging::Skipped;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
-use crate::stereo::recheck::{CauseSeen, Recheck, Stray};
+use crate::stereo::recheck::Recheck;
 
 /// The history's name in a results folder.
 pub const HISTORY: &str = "recheck.csv";
@@ -77,48 +76,32 @@ pub struct CheckedAgainst {
     pub statement: String,
 }
 
-/// The content of `recheck.json`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RecheckFile {
-    standing: Standing,
-    tolerance_mm: f64,
-    /// The calibration that was compared with.
-    against: String,
-    pairs: Vec<String>,
-    pairs_skipped: Vec<Skipped>,
-    /// Pairs that contradict the calibration by themselves, and by what matters.
-    pairs_contradicting: Vec<Stray>,
-    /// The length that changes are given for.
-    length_mm: f64,
-    /// One or, not told apart, several with `|`; empty where nothing changed.
-    cause: String,
-    statement: String,
-    /// By how much the change moves a length, or the pairs that contradict the calibration are off, mm.
-    effect_mm: f64,
-    /// The largest change of a length that a single cause could make without being seen in nineteen of twenty checks, mm.
-    seen_mm: f64,
-    causes: Vec<CauseSeen>,
+/// What is said, and by how much the change moves a length or the pairs that contradict the calibration are off, mm.
+fn found(recheck: &Recheck, standing: Standing) -> (String, f64) {
+    standing.contradicted(recheck).unwrap_or_else(|| (recheck.statement(), recheck.effect_mm))
 }
 
-impl RecheckFile {
-    pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> RecheckFile {
-        let found = || (recheck.statement(), recheck.effect_mm);
-        let (statement, effect_mm) = standing.contradicted(recheck).unwrap_or_else(found);
-        RecheckFile {
-            standing,
-            tolerance_mm,
-            against: against.to_string(),
-            pairs: recheck.pairs.clone(),
-            pairs_skipped: recheck.skipped.clone(),
-            pairs_contradicting: recheck.strays.clone(),
-            length_mm: recheck.length_mm,
-            cause: recheck.cause(),
-            statement,
-            effect_mm,
-            seen_mm: recheck.seen_mm,
-            causes: recheck.causes.clone(),
-        }
-    }
+/// The content of `recheck.json`; `against` is the calibration that was compared with.
+pub fn content(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> serde_json::Value {
+    let (statement, effect_mm) = found(recheck, standing);
+    serde_json::json!({
+        "standing": standing,
+        "tolerance_mm": tolerance_mm,
+        "against": against,
+        "pairs": recheck.pairs,
+        "pairs_skipped": recheck.skipped,
+        // Pairs that contradict the calibration by themselves, and by what matters.
+        "pairs_contradicting": recheck.strays,
+        // The length that changes are given for.
+        "length_mm": recheck.length_mm,
+        // One or, not told apart, several with `|`; empty where nothing changed.
+        "cause": recheck.cause(),
+        "statement": statement,
+        "effect_mm": effect_mm,
+        // The largest change of a length that a single cause could make without being seen in nineteen of twenty checks.
+        "seen_mm": recheck.seen_mm,
+        "causes": recheck.causes,
+    })
 }
 
 /// One check in the history.
@@ -143,16 +126,16 @@ pub struct Check {
 }
 
 impl Check {
-    pub fn new(file: &RecheckFile, date: String) -> Check {
+    pub fn new(recheck: &Recheck, standing: Standing, against: &Utf8Path, date: String) -> Check {
         Check {
             date,
-            against: file.against.clone(),
-            pairs: file.pairs.len(),
-            standing: file.standing,
-            cause: file.cause.clone(),
-            effect_mm: file.effect_mm,
-            seen_mm: file.seen_mm,
-            length_mm: Some(file.length_mm),
+            against: against.to_string(),
+            pairs: recheck.pairs.len(),
+            standing,
+            cause: recheck.cause(),
+            effect_mm: found(recheck, standing).1,
+            seen_mm: recheck.seen_mm,
+            length_mm: Some(recheck.length_mm),
         }
     }
 }

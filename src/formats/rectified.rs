@@ -2,6 +2,7 @@
 
 use nalgebra::{Matrix3, Matrix3x4};
 use serde::Serialize;
+use serde_json::{Value, json};
 
 use crate::imaging::{Board, Skipped};
 use crate::linear_algebra::rows;
@@ -19,16 +20,9 @@ pub struct RectifiedFile {
     pub alpha: Option<f64>,
     /// `stereoRectify`'s `CALIB_ZERO_DISPARITY`.
     pub zero_disparity: Option<bool>,
-    #[serde(rename = "R1")]
-    r1: Vec<Vec<f64>>,
-    #[serde(rename = "R2")]
-    r2: Vec<Vec<f64>>,
-    #[serde(rename = "P1")]
-    p1: Vec<Vec<f64>>,
-    #[serde(rename = "P2")]
-    p2: Vec<Vec<f64>>,
-    #[serde(rename = "Q", skip_serializing_if = "Option::is_none")]
-    q: Option<Vec<Vec<f64>>>,
+    /// `R1`, `R2`, `P1`, `P2`, and `Q` of pictures on common rows.
+    #[serde(flatten)]
+    matrices: Value,
     /// Share of each rectified picture that shows something.
     pub coverage: Coverage,
     /// "rows", or "columns" for cameras one above the other: what corresponding points have in common.
@@ -36,7 +30,6 @@ pub struct RectifiedFile {
     /// How far the rows differ over all corners of the board that was found; null without a board.
     pub residual: Option<RowResidual>,
     pub board: Option<String>,
-    /// The pairs written.
     pub pairs: Vec<RectifiedPair>,
     /// The pairs not written, and why.
     pub pairs_skipped: Vec<Skipped>,
@@ -63,14 +56,15 @@ impl RectifiedFile {
     /// Of pictures on common rows.
     pub fn rectified(rig: &Rig, matrices: &Matrices, scaling: Scaling, coverage: Coverage) -> RectifiedFile {
         let common = if matrices.in_columns() { "columns" } else { "rows" };
-        RectifiedFile {
+        let mut file = RectifiedFile {
             mode: "rectify",
             alpha: Some(scaling.alpha),
             zero_disparity: Some(scaling.zero_disparity),
-            q: Some(rows(&matrices.disparity_to_depth)),
             common: Some(common),
             ..RectifiedFile::of(rig, Side::BOTH.map(|side| matrices.of(side)), coverage)
-        }
+        };
+        file.matrices["Q"] = json!(rows(&matrices.disparity_to_depth));
+        file
     }
 
     /// Of pictures that were straightened, each in its own camera's matrix.
@@ -85,10 +79,7 @@ impl RectifiedFile {
             mode: "undistort",
             width: rig.left.width,
             height: rig.left.height,
-            r1: rows(r1),
-            r2: rows(r2),
-            p1: rows(p1),
-            p2: rows(p2),
+            matrices: json!({"R1": rows(r1), "R2": rows(r2), "P1": rows(p1), "P2": rows(p2)}),
             coverage,
             ..RectifiedFile::default()
         }

@@ -1,65 +1,50 @@
 //! `verify.json`: whether a robot still is the identified one. The history has the form of [`super::recheck`].
 
 use camino::Utf8Path;
-use serde::Serialize;
+use serde_json::{Map, Value, json};
 
 use super::recheck::Standing;
-use crate::identify::judge::recheck::{CauseSeen, Moved, Recheck};
+use crate::identify::judge::recheck::Recheck;
 
 /// The history's name in a results folder.
 pub const HISTORY: &str = "verify.csv";
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RobotRecheckFile {
-    pub standing: Standing,
-    tolerance_mm: f64,
-    /// The robot that was compared with.
-    against: String,
-    poses: Vec<String>,
-    /// Poses that fit far worse than the rest and were left out.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    strays: Vec<String>,
-    /// One or, not told apart, several with `|`; empty where nothing changed.
-    cause: String,
-    statement: String,
-    /// By how much the change moves the target, mm.
-    effect_mm: f64,
-    /// The largest movement of the target that a single cause could make without being seen in nineteen of twenty checks, mm.
-    seen_mm: f64,
-    /// The largest movement of the target by a single cause that these poses leave room for, with a chance of nineteen in twenty, mm.
-    at_most_mm: f64,
-    /// The same wherever the robot was identified, mm.
-    elsewhere_mm: f64,
-    causes: Vec<CauseSeen>,
-    placements: Vec<Moved>,
+/// What is said of the robot; `own_data` says that these are the rows that it was identified from.
+pub fn standing(recheck: &Recheck, tolerance_mm: f64, own_data: bool) -> Standing {
+    let changed = !recheck.cause().is_empty();
+    match Standing::of(changed, recheck.effect_mm, recheck.room_mm(), tolerance_mm) {
+        // Rows from before say nothing of what happened since, whatever they say.
+        _ if own_data => Standing::OwnData,
+        _ if !recheck.extrapolated.is_empty() || recheck.scatters() => Standing::Undecided,
+        Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
+        other => other,
+    }
 }
 
-impl RobotRecheckFile {
-    pub fn new(recheck: &Recheck, against: &Utf8Path, tolerance_mm: f64, own_data: bool) -> RobotRecheckFile {
-        let changed = !recheck.cause().is_empty();
-        let standing = match Standing::of(changed, recheck.effect_mm, recheck.room_mm(), tolerance_mm) {
-            // Rows from before say nothing of what happened since, whatever they say.
-            _ if own_data => Standing::OwnData,
-            _ if !recheck.extrapolated.is_empty() || recheck.scatters() => Standing::Undecided,
-            Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
-            other => other,
-        };
-        RobotRecheckFile {
-            standing,
-            tolerance_mm,
-            against: against.to_string(),
-            poses: recheck.poses.clone(),
-            strays: recheck.strays.clone(),
-            cause: recheck.cause(),
-            statement: recheck.statement(),
-            effect_mm: recheck.effect_mm,
-            seen_mm: recheck.seen_mm,
-            at_most_mm: recheck.at_most_mm,
-            elsewhere_mm: recheck.elsewhere_mm,
-            causes: recheck.causes.clone(),
-            placements: recheck.placements.clone(),
-        }
-    }
+/// The content of `verify.json`; `against` is the robot that was compared with.
+pub fn content(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolerance_mm: f64) -> Map<String, Value> {
+    let fields = [
+        ("standing", json!(standing)),
+        ("tolerance_mm", json!(tolerance_mm)),
+        ("against", json!(against)),
+        ("poses", json!(recheck.poses)),
+        // Poses that fit far worse than the rest and were left out.
+        ("strays", json!(recheck.strays)),
+        // One or, not told apart, several with `|`; empty where nothing changed.
+        ("cause", json!(recheck.cause())),
+        ("statement", json!(recheck.statement())),
+        // By how much the change moves the target.
+        ("effect_mm", json!(recheck.effect_mm)),
+        // The largest movement of the target that a single cause could make without being seen in nineteen of twenty checks.
+        ("seen_mm", json!(recheck.seen_mm)),
+        // The largest that these poses leave room for, with a chance of nineteen in twenty, at them and wherever the robot was identified.
+        ("at_most_mm", json!(recheck.at_most_mm)),
+        ("elsewhere_mm", json!(recheck.elsewhere_mm)),
+        ("causes", json!(recheck.causes)),
+        ("placements", json!(recheck.placements)),
+    ];
+    let said = fields.into_iter().filter(|(key, _)| *key != "strays" || !recheck.strays.is_empty());
+    said.map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 #[cfg(test)]
@@ -90,8 +75,7 @@ mod tests {
     /// Poses near to each other rule out a change at them, and none elsewhere; readings that scatter more rule out little and prove no change.
     #[test]
     fn a_robot_is_valid_where_it_was_identified_and_scatter_is_no_change() {
-        let standing =
-            |recheck: &Recheck| RobotRecheckFile::new(recheck, Utf8Path::new("r.toml"), 0.05, false).standing;
+        let standing = |recheck: &Recheck| standing(recheck, 0.05, false);
         assert_eq!(standing(&unchanged(0.012, 0.04)), Standing::StillValid);
         assert_eq!(standing(&unchanged(0.012, 1.2)), Standing::Undecided);
         let likeliest = vec![("scatter".to_owned(), "the readings scatter more".to_owned())];

@@ -51,11 +51,8 @@ pub fn read(path: &Utf8Path, robot: &Robot) -> Result<Vec<Row>> {
         let message = format!("a pose has the columns {}; there is no {}", columns.join(","), missing.join(", "));
         return Err(table.refuse_with(1, message, Some(HINT)));
     }
-    let joints = if poses.is_empty() || table.column("j1_deg").or(table.column("j1_mm")).is_some() {
-        joint_columns(&table, robot)?
-    } else {
-        Vec::new()
-    };
+    let has_joints = poses.is_empty() || table.column("j1_deg").or(table.column("j1_mm")).is_some();
+    let joints = if has_joints { joint_columns(&table, robot)? } else { Vec::new() };
     let row = |(line, row): &(u64, Fields)| {
         let given = !joints.is_empty() && (poses.is_empty() || joints.iter().any(|&c| !row[c].is_empty()));
         let numbers =

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::columns::judge::{Basis, Way};
-use super::columns::layout::{ONE_POINT, are_readings, is_kept};
+use super::columns::layout::{ONE_POINT, are_readings, is_kept, point};
 use super::columns::part::{At, Kind, Part};
 use super::columns::pick::{self, listed};
 use super::rows::{Measurement, from_table, reading_name};
@@ -22,13 +22,13 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     let counts: Vec<String> = parts.iter().map(|p| format!("{} has {} rows", p.file_name(), p.rows.len())).collect();
     for part in parts.iter_mut().filter(|part| part.rows.len() != least) {
         let times = part.rows.len() / least;
-        let order = if times * least == part.rows.len() { order(part, least, times) } else { None };
-        let Some(order) = order else {
+        let strides = if times * least == part.rows.len() { strides(part, least, times) } else { None };
+        let Some((of_row, of_reading)) = strides else {
             let hint = "files are joined row by row: the same rows in each, or for each pose so many readings one after the other, whose distances are kept";
             return Err(part.refuse(counts.join(", "), Some(hint)));
         };
         let together = |row: usize| {
-            let all: Vec<&(u64, Fields)> = (0..times).map(|k| &part.rows[order(row, k)]).collect();
+            let all: Vec<&(u64, Fields)> = (0..times).map(|k| &part.rows[row * of_row + k * of_reading]).collect();
             (all[0].0, Fields::new(all.iter().flat_map(|(_, fields)| fields.iter())))
         };
         let rows = (0..least).map(together).collect();
@@ -49,23 +49,19 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     Ok(widened)
 }
 
-/// Where the k-th reading of a pose stands: one after the other, or first all of the first target.
-fn order(part: &Part, poses: usize, times: usize) -> Option<Box<dyn Fn(usize, usize) -> usize>> {
-    let columns = coordinates(part)?;
-    let point = |row: usize| -> Option<nalgebra::Point3<f64>> {
-        let number = |c: usize| part.optional(row, c).ok().flatten();
-        Some(nalgebra::Point3::new(number(columns[0])?, number(columns[1])?, number(columns[2])?))
-    };
+/// How many rows farther the next pose stands, and the next reading of a pose: one after the other, or first all of the first target.
+fn strides(part: &Part, poses: usize, times: usize) -> Option<(usize, usize)> {
+    let columns = coordinates(part)?.map(|column| At { part: 0, column });
+    let point = |row: usize| point(std::slice::from_ref(part), row, &columns);
     let apart = |a: usize, b: usize| Some((point(a)? - point(b)?).norm());
     let next: Vec<f64> = (0..poses).filter_map(|row| apart(row * times, row * times + 1)).collect();
     let between: Vec<f64> = (1..poses).filter_map(|row| apart((row - 1) * times, row * times)).collect();
     let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len().max(1) as f64;
     if is_kept(next.clone()) || mean(&next) < ONE_POINT * mean(&between) {
-        return Some(Box::new(move |row, k| row * times + k));
+        return Some((times, 1));
     }
     let later: Vec<f64> = (0..poses).filter_map(|row| apart(row, poses + row)).collect();
-    (is_kept(later.clone()) || mean(&later) < ONE_POINT * mean(&between))
-        .then(|| -> Box<dyn Fn(usize, usize) -> usize> { Box::new(move |row, k| k * poses + row) })
+    (is_kept(later.clone()) || mean(&later) < ONE_POINT * mean(&between)).then_some((1, poses))
 }
 
 /// The first three columns that are a point.
@@ -95,8 +91,8 @@ impl Taken<'_> {
         let places = self.targets_as_readings();
         let own = self.own();
         let mut header: Vec<String> = ["pose", "group", "role"].map(str::to_owned).into();
-        let several = picked.points.len() > 1 && !places;
-        header.extend((several && !own.contains_key("target")).then(|| "target".to_owned()));
+        let several = picked.points.len() > 1 && !places && !own.contains_key("target");
+        header.extend(several.then(|| "target".to_owned()));
         header.extend(self.robot.joints.iter().enumerate().map(|(j, joint)| reading_name(j, joint.slides)));
         header.extend(match picked.distance {
             Some(_) => vec!["distance_mm".to_owned()],
@@ -114,7 +110,7 @@ impl Taken<'_> {
             for (k, (target, columns)) in measured.iter().enumerate() {
                 let repeated = (places && measured.len() > 1).then_some(k + 1);
                 let mut cells = self.named(row, repeated, &own);
-                cells.extend((several && !own.contains_key("target")).then(|| (*target).to_owned()));
+                cells.extend(several.then(|| (*target).to_owned()));
                 for (at, joint) in picked.joints.iter().zip(&self.robot.joints) {
                     let value = self.parts[at.part].number(row, at.column)?;
                     let reading = pick::reading(self.parts, at, joint, value, self.way.joints, self.way.lengths);
@@ -193,12 +189,9 @@ impl Taken<'_> {
         let files: Vec<String> = self.parts.iter().map(Part::file_name).collect();
         let count = self.count();
         let from = |columns: &[At]| {
-            let of = if self.parts.len() > 1 {
-                format!(" of {}", self.parts[columns[0].part].file_name())
-            } else {
-                String::new()
-            };
-            match self.parts[columns[0].part].is_program() {
+            let part = &self.parts[columns[0].part];
+            let of = if self.parts.len() > 1 { format!(" of {}", part.file_name()) } else { String::new() };
+            match part.is_program() {
                 true => format!("targets{of}"),
                 false => format!("{}{of}", listed(self.parts, columns)),
             }
@@ -229,12 +222,12 @@ impl Taken<'_> {
         );
         text.push_str(&self.form());
         let own = self.own();
-        let absent = |name: &str, says: &str| if own.contains_key(name) { String::new() } else { says.to_owned() };
-        text.push_str(&absent("pose", "; pose = row"));
-        text.push_str(&match self.number {
-            Some(number) if !own.contains_key("group") => format!("; group = {number}"),
-            _ => String::new(),
-        });
+        if !own.contains_key("pose") {
+            text.push_str("; pose = row");
+        }
+        if let Some(number) = self.number.filter(|_| !own.contains_key("group")) {
+            let _ = write!(text, "; group = {number}");
+        }
         text.push_str(&self.unused());
         text
     }

@@ -18,6 +18,10 @@ const EXACT: f64 = 1e-6;
 /// Of the readings at joints that were read before, this share are copies where any are.
 const NEARLY_ALL: f64 = 0.9;
 
+fn bits(numbers: &[f64]) -> Vec<u64> {
+    numbers.iter().map(|v| v.to_bits()).collect()
+}
+
 fn is_rounded(v: &f64) -> bool {
     (v / ROUNDED_MM - (v / ROUNDED_MM).round()).abs() < EXACT
 }
@@ -37,8 +41,8 @@ pub(super) fn counted_once(rows: Vec<Measurement>) -> (Vec<Measurement>, Vec<Str
     for (i, row) in rows.iter().enumerate() {
         let Some(point) = point(row) else { continue };
         measured += 1;
-        joints.insert((&row.at.group, &row.target, row.at.joints_deg.iter().map(|v| v.to_bits()).collect::<Vec<_>>()));
-        let numbers = row.at.joints_deg.iter().chain(point.iter()).map(|v| v.to_bits()).collect();
+        joints.insert((&row.at.group, &row.target, bits(&row.at.joints_deg)));
+        let numbers = [bits(&row.at.joints_deg), bits(point.coords.as_slice())].concat();
         let before = *first.entry(numbers).or_insert(i);
         let same = |a: &Measurement, b: &Measurement| {
             (&a.at.group, a.at.role, &a.target) == (&b.at.group, b.at.role, &b.target)
@@ -67,18 +71,18 @@ pub(super) fn counted_once(rows: Vec<Measurement>) -> (Vec<Measurement>, Vec<Str
 
 /// The rows, those to verify without a reading that are copies of rows to fit: the robot was fitted to their numbers.
 pub(super) fn verifying_nothing(mut rows: Vec<Measurement>) -> Vec<Measurement> {
-    let joints = |row: &Measurement| row.at.joints_deg.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-    let numbers = |row: &Measurement| Some([joints(row), read(row)?.iter().map(|v| v.to_bits()).collect()].concat());
+    let numbers = |row: &Measurement| Some([bits(&row.at.joints_deg), bits(&row.observed.read()?)].concat());
     let (mut fitted, mut places) = (BTreeSet::new(), BTreeSet::new());
     for row in rows.iter().filter(|row| row.at.role != Role::Verify) {
         fitted.extend(numbers(row).map(|numbers| (row.target.clone(), numbers)));
-        places.insert(joints(row));
+        places.insert(bits(&row.at.joints_deg));
     }
-    let of_verify = |row: &Measurement| row.at.role == Role::Verify && places.contains(&joints(row));
-    let again: Vec<usize> = (0..rows.len()).filter(|&i| of_verify(&rows[i]) && read(&rows[i]).is_some()).collect();
+    let of_verify = |row: &Measurement| row.at.role == Role::Verify && places.contains(&bits(&row.at.joints_deg));
+    let is_again = |i: &usize| of_verify(&rows[*i]) && rows[*i].observed.read().is_some();
+    let again: Vec<usize> = (0..rows.len()).filter(is_again).collect();
     let is_copy = |i: &usize| numbers(&rows[*i]).is_some_and(|n| fitted.contains(&(rows[*i].target.clone(), n)));
     let copies: Vec<usize> = again.iter().copied().filter(is_copy).collect();
-    let rounded = copies.iter().filter_map(|&i| read(&rows[i])).all(|read| read.iter().all(is_rounded));
+    let rounded = copies.iter().filter_map(|&i| rows[i].observed.read()).all(|read| read.iter().all(is_rounded));
     if rounded && (copies.len() as f64) < NEARLY_ALL * again.len() as f64 {
         return rows;
     }
@@ -89,31 +93,19 @@ pub(super) fn verifying_nothing(mut rows: Vec<Measurement>) -> Vec<Measurement> 
     rows
 }
 
-/// What was read.
-fn read(row: &Measurement) -> Option<Vec<f64>> {
-    match &row.observed {
-        Observed::Position { point_mm, .. } => Some(point_mm.iter().copied().collect()),
-        Observed::Distance { distance_mm, .. } => Some(vec![*distance_mm]),
-        Observed::Missing { .. } => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::identify::synthetic::{self, seen_at};
 
     fn row(k: usize, role: Role, observed: Observed) -> Measurement {
-        let (pose, joints_deg) = (format!("{}{k}", role.name()), vec![k as f64, 30.0]);
-        let at = RobotPose { pose, group: "g".into(), role, joints_deg, slides: vec![] };
-        Measurement { at, target: String::new(), observed }
+        synthetic::row(format!("{}{k}", role.name()), "g", role, vec![k as f64, 30.0], observed)
     }
 
     fn point(k: usize, off_mm: f64) -> Observed {
-        let point_mm = Point3::new(1000.1234 + 50.0 * k as f64 + off_mm, 20.0, 30.0);
-        Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None }
+        seen_at(Point3::new(1000.1234 + 50.0 * k as f64 + off_mm, 20.0, 30.0))
     }
 
     fn distance(k: usize, off_mm: f64) -> Observed {

@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Measurement, Observed, Role};
+use super::{Measurement, Role};
 use crate::files::provenance::sha256;
 
 /// Digits of a word: among a million rows two different ones share it with a chance of one in ten million.
@@ -54,12 +54,7 @@ impl Given {
 
 /// `None` of a row without a reading.
 fn word(row: &Measurement) -> Option<String> {
-    let reading: Vec<f64> = match &row.observed {
-        Observed::Position { point_mm, .. } => point_mm.iter().copied().collect(),
-        Observed::Distance { distance_mm, .. } => vec![*distance_mm],
-        Observed::Missing { .. } => return None,
-    };
-    Some(word_of(&row.at.joints_deg, &reading))
+    Some(word_of(&row.at.joints_deg, &row.observed.read()?))
 }
 
 fn word_of(joints_deg: &[f64], reading: &[f64]) -> String {
@@ -74,22 +69,10 @@ mod tests {
     use nalgebra::Point3;
 
     use super::*;
-    use crate::measurements::RobotPose;
+    use crate::identify::synthetic::{self, seen_at};
 
     fn row(joint: f64, x: f64, role: Role) -> Measurement {
-        let at = RobotPose {
-            pose: format!("{joint}"),
-            group: "g".into(),
-            role,
-            joints_deg: vec![joint, -0.0],
-            slides: vec![],
-        };
-        let point_mm = Point3::new(x, 2.0, 3.0);
-        Measurement {
-            at,
-            target: String::new(),
-            observed: Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None },
-        }
+        synthetic::row(joint.to_string(), "g", role, vec![joint, -0.0], seen_at(Point3::new(x, 2.0, 3.0)))
     }
 
     #[test]

@@ -80,6 +80,17 @@ pub enum Observed {
     },
 }
 
+impl Observed {
+    /// The numbers that were read, mm.
+    pub(super) fn read(&self) -> Option<Vec<f64>> {
+        match self {
+            Observed::Position { point_mm, .. } => Some(point_mm.iter().copied().collect()),
+            Observed::Distance { distance_mm, .. } => Some(vec![*distance_mm]),
+            Observed::Missing { .. } => None,
+        }
+    }
+}
+
 /// A row of `measurements.csv`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measurement {
@@ -238,10 +249,9 @@ pub(super) fn from_table(table: &Table) -> Result<Vec<Measurement>> {
         let line = *line;
         let numbers =
             |columns: &[usize]| columns.iter().map(|&c| table.number(line, row, c)).collect::<Result<Vec<_>>>();
-        let optional = |columns: &Option<Vec<usize>>| match columns {
-            Some(columns) if !columns.iter().all(|&c| row[c].is_empty()) => numbers(columns).map(Some),
-            _ => Ok(None),
-        };
+        let filled = |columns: &&Vec<usize>| !columns.iter().all(|&c| row[c].is_empty());
+        let optional =
+            |columns: &Option<Vec<usize>>| columns.as_ref().filter(filled).map(|columns| numbers(columns)).transpose();
         let said = status.map_or("ok", |c| &row[c]);
         let observed = if !(said.is_empty() || said == "ok") {
             Observed::Missing { reason: said.to_owned() }

@@ -101,11 +101,8 @@ impl Source {
             }
             parts.push(Part::read(file, count, self.columns.is_some())?);
         }
-        let joined_by_columns = match &self.columns {
-            Some(columns) => name_columns(&mut parts, columns, count)?,
-            None => false,
-        };
-        let sets = if joined_by_columns { vec![parts] } else { sets(parts, count) };
+        let named = self.columns.as_ref().map(|columns| name_columns(&mut parts, columns, count)).transpose()?;
+        let sets = if named == Some(true) { vec![parts] } else { sets(parts, count) };
         let several = sets.len() > 1;
         let (mut rows, mut said) = (Vec::new(), Vec::new());
         for (number, mut set) in sets.into_iter().enumerate() {

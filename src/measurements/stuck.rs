@@ -76,30 +76,19 @@ fn places<'a>(rows: impl Iterator<Item = &'a Measurement>, robot: &Robot, enough
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measurements::{RobotPose, Role};
+    use crate::identify::synthetic::{self, seen_at};
+    use crate::measurements::Role;
 
     /// Rows of the paper's robot, as read from two metres away.
     fn rows(count: usize) -> Vec<Measurement> {
         let row = |k: usize| {
             let t = k as f64;
-            let joints_deg = vec![
-                40.0 * t.sin(),
-                20.0 * (1.3 * t).cos(),
-                15.0 * (0.7 * t).sin(),
-                5.0 * t % 60.0,
-                30.0,
-                9.0 * t % 50.0,
-            ];
-            let at = RobotPose {
-                pose: format!("p{k}"),
-                group: format!("{}", k % 2),
-                role: if k.is_multiple_of(5) { Role::Verify } else { Role::Sample },
-                joints_deg,
-                slides: vec![],
-            };
-            let point_mm = Robot::paper().target_mm(&at.joints_rad()) + Vector3::new(2000.0, 0.0, 0.0);
-            let observed = Observed::Position { point_mm, covariance_mm2: None, rotation_rad: None };
-            Measurement { at, target: String::new(), observed }
+            let [a, b, c] = [40.0 * t.sin(), 20.0 * (1.3 * t).cos(), 15.0 * (0.7 * t).sin()];
+            let joints_deg = vec![a, b, c, 5.0 * t % 60.0, 30.0, 9.0 * t % 50.0];
+            let joints_rad: Vec<f64> = joints_deg.iter().map(|q: &f64| q.to_radians()).collect();
+            let point_mm = Robot::paper().target_mm(&joints_rad) + Vector3::new(2000.0, 0.0, 0.0);
+            let role = if k.is_multiple_of(5) { Role::Verify } else { Role::Sample };
+            synthetic::row(format!("p{k}"), &(k % 2).to_string(), role, joints_deg, seen_at(point_mm))
         };
         (0..count).map(row).collect()
     }

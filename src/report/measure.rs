@@ -98,7 +98,7 @@ fn tone(series: &Series, file: &MeasureFile, doubts: &[String]) -> Tone {
     match &series.judgement {
         judgement if judgement.ends_the_run() => Tone::Bad,
         _ if !doubts.is_empty() => Tone::Doubtful,
-        Judgement::Agrees if file.poses == file.measured && file.chi_square_is_usual() => Tone::Good,
+        Judgement::Agrees if file.poses == file.measured && file.chi_square_is_usual => Tone::Good,
         _ => Tone::Doubtful,
     }
 }

@@ -20,7 +20,7 @@ pub fn list() -> String {
     let width = ARMS.iter().map(|a| a.name.len()).max().unwrap_or(0);
     let mut text = String::new();
     for arm in ARMS {
-        let _ = writeln!(text, "{:width$}  {}, {} joints; {}", arm.name, arm.title, arm.rows.len(), arm.source);
+        let _ = writeln!(text, "{:width$}  {}, {} joints; {}", arm.name, arm.title, arm.joints.len(), arm.source);
     }
     let _ = writeln!(text, "{PAPER:width$}  the robot of Table 1 of the paper, 6 joints; limits of a common arm");
     text

@@ -82,9 +82,9 @@ impl Torques {
     }
 
     fn place(&self, point: LoadPoint) -> Option<Point3<f64>> {
-        match point.joint() {
-            Some(index) => self.axes.get(index).map(|axes| axes.origin),
-            None => Some(self.tool_mm),
+        match point {
+            LoadPoint::Origin(index) => self.axes.get(index).map(|axes| axes.origin),
+            LoadPoint::Tool => Some(self.tool_mm),
         }
     }
 

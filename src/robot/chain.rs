@@ -5,7 +5,6 @@
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use super::corrections::Corrections;
-use super::ends::Ends;
 use crate::geometry::Transform;
 
 /// One joint with the link before it: `Rx(alpha) Tx(a) Ry(beta) Rz(sign q + theta) Tz(d)`, or, where it slides,
@@ -43,6 +42,23 @@ impl Default for Joint {
             slides: false,
             sign: 1.0,
         }
+    }
+}
+
+/// What stands before the first and behind the last joint's frame: constant transforms that no calibration changes, the identity by default.
+/// A drawing's base and flange need not be the frames of the Denavit-Hartenberg chain: `[base]` and `[flange]` of a robot file
+/// say where they are, so that an imported chain reaches exactly the flange poses of its source.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends {
+    /// Frame 0 of the chain in the root frame of its source.
+    pub root_from_frame0: Transform,
+    /// The flange in the last joint's frame.
+    pub last_frame_from_flange: Transform,
+}
+
+impl Default for Ends {
+    fn default() -> Ends {
+        Ends { root_from_frame0: Transform::identity(), last_frame_from_flange: Transform::identity() }
     }
 }
 
@@ -167,9 +183,7 @@ impl Robot {
         }
         self
     }
-}
 
-impl Robot {
     /// The flange in the root frame, both constant transforms included. One commanded reading a joint.
     pub fn root_from_flange(&self, joints: &[f64]) -> Transform {
         self.ends.root_from_frame0 * self.base_from_flange(joints) * self.ends.last_frame_from_flange

@@ -42,14 +42,6 @@ impl LoadPoint {
         };
         (joint < joint_count).then_some(LoadPoint::Origin(joint))
     }
-
-    /// The joint whose frame's origin it is, or `None` for the tool.
-    pub(super) fn joint(self) -> Option<usize> {
-        match self {
-            LoadPoint::Origin(joint) => Some(joint),
-            LoadPoint::Tool => None,
-        }
-    }
 }
 
 /// A joint yields to the torque of a unit weight: about its axis where it sags, across it where its bearing and the link before bend.

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::check::{Advice, Check};
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
-use super::ends::PoseRecord;
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
 use crate::diagnostic::Place;
 use crate::files;
+use crate::geometry::{Transform, rotation_vector, transform};
 
 /// What is `None` does not stand in the file.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -60,6 +60,36 @@ struct ToolRecord {
     x_mm: f64,
     y_mm: f64,
     z_mm: f64,
+}
+
+/// A transform in a robot file.
+#[derive(Debug, Clone, Copy, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct PoseRecord {
+    x_mm: f64,
+    y_mm: f64,
+    z_mm: f64,
+    rx_rad: f64,
+    ry_rad: f64,
+    rz_rad: f64,
+}
+
+impl PoseRecord {
+    /// The transform; `None` where a number is not finite.
+    fn transform(&self) -> Option<Transform> {
+        let (t, r) =
+            (Vector3::new(self.x_mm, self.y_mm, self.z_mm), Vector3::new(self.rx_rad, self.ry_rad, self.rz_rad));
+        (t.iter().chain(r.iter()).all(|v| v.is_finite())).then(|| transform(r, t))
+    }
+
+    /// As it stands in the file; nothing for the identity.
+    fn of(a_from_b: &Transform) -> Option<PoseRecord> {
+        if *a_from_b == Transform::identity() {
+            return None;
+        }
+        let (t, r) = (a_from_b.translation.vector, rotation_vector(a_from_b));
+        Some(PoseRecord { x_mm: t.x, y_mm: t.y, z_mm: t.z, rx_rad: r.x, ry_rad: r.y, rz_rad: r.z })
+    }
 }
 
 /// Sag of the joints: `k_mrad_per_m` times the lever of a unit weight at `point`.
@@ -117,7 +147,6 @@ fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-/// Reads `robot.toml`.
 pub fn read(path: &Utf8Path) -> Result<Robot> {
     read_checked(path).map(|(robot, _)| robot)
 }
@@ -211,10 +240,8 @@ impl RobotRecord {
             return Err("a robot needs at least one [[joint]]".to_owned());
         }
         let tool_mm = Vector3::new(self.tool.x_mm, self.tool.y_mm, self.tool.z_mm);
-        let mut joints = Vec::with_capacity(self.joint.len());
-        for (i, j) in self.joint.iter().enumerate() {
-            joints.push(j.joint().map_err(|said| format!("joint {}: {said}", i + 1))?);
-        }
+        let joint = |(j, number): (&JointRecord, usize)| j.joint().map_err(|said| format!("joint {number}: {said}"));
+        let joints = self.joint.iter().zip(1..).map(joint).collect::<Result<Vec<Joint>, String>>()?;
         if tool_mm.iter().any(|v| !v.is_finite()) {
             return Err("[tool]: every number must be finite".to_owned());
         }

@@ -7,9 +7,9 @@
 
 use std::f64::consts::TAU;
 
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DMatrix, DVector, Vector3, Vector6};
 
-use super::Robot;
+use super::{Joint, Robot};
 use crate::geometry::{Transform, rotation_vector};
 
 /// Length by which angles are weighed against mm: a robot's wrist at about arm's length.
@@ -24,12 +24,16 @@ const REACHED_MM: f64 = 1e-7;
 /// Steps from one start.
 const MAX_STEPS: usize = 100;
 
-/// Difference between the flange's pose at `joints_rad` and the wanted one, base frame: translation (mm), then rotation times [`ARM_MM`].
-fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
-    let reached = robot.base_from_flange(joints_rad);
+/// Difference between a pose and another, base frame: translation (mm), then rotation times `turn_mm`.
+pub(super) fn off(reached: &Transform, wanted: &Transform, turn_mm: f64) -> Vector6<f64> {
     let t = reached.translation.vector - wanted.translation.vector;
-    let r = rotation_vector(&(reached * wanted.inverse())) * ARM_MM;
+    let r = rotation_vector(&(reached * wanted.inverse())) * turn_mm;
     Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
+}
+
+/// The same of the flange's pose at `joints_rad`, turns times [`ARM_MM`].
+fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
+    off(&robot.base_from_flange(joints_rad), wanted, ARM_MM)
 }
 
 /// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j` at the angles that the
@@ -41,8 +45,7 @@ fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
     let mut base_from_joint = Transform::identity();
     for (joint, &q) in bent.joints.iter().zip(&bent.joints_rad) {
         base_from_joint *= joint.previous_from_this(q);
-        screws
-            .push((base_from_joint.rotation * nalgebra::Vector3::z() * joint.sign, base_from_joint.translation.vector));
+        screws.push((base_from_joint.rotation * Vector3::z() * joint.sign, base_from_joint.translation.vector));
     }
     let flange = base_from_joint.translation.vector;
     let mut columns = DMatrix::zeros(6, robot.joints.len());
@@ -104,17 +107,13 @@ pub fn approach_place(
     flange_from_tool: &Transform,
     start_rad: &[f64],
 ) -> Approach {
-    let missed = |q: &[f64], turn_mm: f64| {
-        let reached = robot.base_from_flange(q) * flange_from_tool;
-        let t = reached.translation.vector - base_from_tool.translation.vector;
-        let r = rotation_vector(&(reached * base_from_tool.inverse())) * turn_mm;
-        Vector6::new(t.x, t.y, t.z, r.x, r.y, r.z)
-    };
+    let missed =
+        |q: &[f64], turn_mm: f64| off(&(robot.base_from_flange(q) * flange_from_tool), base_from_tool, turn_mm);
     let columns = |q: &[f64], turn_mm: f64| {
         let mut columns = jacobian(robot, q);
         let out = robot.base_from_flange(q).rotation * flange_from_tool.translation.vector;
         for mut column in columns.column_iter_mut() {
-            let axis = nalgebra::Vector3::new(column[3], column[4], column[5]) / ARM_MM;
+            let axis = Vector3::new(column[3], column[4], column[5]) / ARM_MM;
             let moved = axis.cross(&out);
             (0..3).for_each(|i| column[i] += moved[i]);
             (3..6).for_each(|i| column[i] *= turn_mm / ARM_MM);
@@ -167,7 +166,7 @@ fn descend(
 /// The same posture without the whole turns that the search took: each joint within half a turn of `near_rad`, as far as its limits let it. Where
 /// a joint's turn moves another one by a part of a turn (a coupling), the search's own answer stays.
 fn unwound(robot: &Robot, base_from_flange: &Transform, found: Approach, near_rad: &[f64]) -> Approach {
-    let turned = |(joint, (&q, near)): (&super::Joint, (&f64, &f64))| {
+    let turned = |(joint, (&q, near)): (&Joint, (&f64, &f64))| {
         let turns = if joint.slides { 0.0 } else { ((q - near) / TAU).round() };
         let is_allowed = |q: f64| joint.limits_rad.is_none_or(|(low, high)| (low..=high).contains(&q));
         // Nearest to the start first; the search's own answer, no turn taken off, is always allowed.
@@ -220,7 +219,7 @@ pub fn merit(robot: &Robot, joints_rad: &[f64]) -> f64 {
 pub fn spread_start(robot: &Robot, k: usize) -> Vec<f64> {
     const PRIMES: [f64; 12] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0, 37.0];
     let share = |j: usize| ((k + 1) as f64 * PRIMES[j % PRIMES.len()].sqrt() * (1 + j / PRIMES.len()) as f64).fract();
-    let place = |(j, joint): (usize, &super::Joint)| {
+    let place = |(j, joint): (usize, &Joint)| {
         let unlimited = if joint.slides { (-ARM_MM, ARM_MM) } else { (-std::f64::consts::PI, std::f64::consts::PI) };
         let (low, high) = joint.limits_rad.unwrap_or(unlimited);
         low + (high - low) * (0.1 + 0.8 * share(j))
@@ -293,11 +292,11 @@ mod tests {
     /// Four axes: the place is reached whatever the tilt, and what is left of the orientation is the tilt alone.
     #[test]
     fn an_arm_of_few_joints_brings_the_tool_to_its_place() {
-        let turn = |a_mm| super::super::Joint { a_mm, ..Default::default() };
-        let slide = super::super::Joint { slides: true, ..Default::default() };
+        let turn = |a_mm| Joint { a_mm, ..Default::default() };
+        let slide = Joint { slides: true, ..Default::default() };
         let robot = Robot { joints: vec![turn(0.0), turn(225.0), turn(175.0), slide], ..Robot::paper() };
         let tool: Transform = Transform::translation(40.0, -25.0, 110.0);
-        let tilt = crate::geometry::transform(nalgebra::Vector3::new(3e-3, -2e-3, 0.0), nalgebra::Vector3::zeros());
+        let tilt = crate::geometry::transform(Vector3::new(3e-3, -2e-3, 0.0), Vector3::zeros());
         let there = robot.base_from_flange(&[0.4, -0.6, 1.1, 30.0]) * tool;
         let wanted = there * tilt;
         let found = approach_place(&robot, &wanted, &tool, &[0.38, -0.63, 1.13, 28.0]);
@@ -309,7 +308,7 @@ mod tests {
     #[test]
     fn out_of_reach_is_none() {
         let robot = Robot::paper();
-        let wanted = crate::geometry::transform(nalgebra::Vector3::zeros(), nalgebra::Vector3::new(2000.0, 0.0, 0.0));
+        let wanted = crate::geometry::transform(Vector3::zeros(), Vector3::new(2000.0, 0.0, 0.0));
         assert_eq!(from_start(&robot, &wanted, &[0.1; 6]), None);
     }
 

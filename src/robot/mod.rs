@@ -7,7 +7,6 @@ pub mod catalogue;
 pub mod chain;
 pub mod check;
 pub mod corrections;
-pub mod ends;
 pub mod file;
 pub mod inverse;
 pub mod jacobian;
@@ -17,10 +16,9 @@ pub mod tool_fit;
 
 use crate::diagnostic::{Explain, Place};
 
-pub use chain::{Joint, Robot};
+pub use chain::{Ends, Joint, Robot};
 pub use check::{Advice, Check};
 pub use corrections::Corrections;
-pub use ends::Ends;
 pub use parameters::{Parameter, Unit};
 
 /// Result of reading a robot.

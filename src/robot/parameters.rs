@@ -1,8 +1,8 @@
 //! The robot as a vector of parameters, in mm and mrad (about equal effect at a robot's reach), and their names.
 
-use super::Robot;
 use super::anatomy::Anatomy;
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
+use super::{Joint, Robot};
 
 /// |sin alpha| below which two neighbouring axes count as parallel: 3 degrees, far above any tolerance of manufacture.
 pub(super) const PARALLEL_SIN: f64 = 0.05;
@@ -185,7 +185,13 @@ impl Robot {
     /// Adds to a parameter, mm or mrad. A joint that the robot lacks is left alone.
     pub fn add(&mut self, parameter: Parameter, delta: f64) {
         let angle = delta / 1000.0;
+        let mut joint = |i: usize, add: &dyn Fn(&mut Joint)| self.joints.get_mut(i).into_iter().for_each(add);
         match parameter {
+            Parameter::Alpha(i) => joint(i, &|j| j.alpha_rad += angle),
+            Parameter::A(i) => joint(i, &|j| j.a_mm += delta),
+            Parameter::Beta(i) => joint(i, &|j| j.beta_rad += angle),
+            Parameter::Theta(i) => joint(i, &|j| j.theta_rad += angle),
+            Parameter::D(i) => joint(i, &|j| j.d_mm += delta),
             Parameter::V(axis) => self.tool_mm[axis.min(2)] += delta,
             Parameter::Gravity(joint, point) => add_compliance(&mut self.corrections.gravity, joint, point, angle),
             Parameter::Bending(joint, point) => add_compliance(&mut self.corrections.bending, joint, point, angle),
@@ -196,16 +202,6 @@ impl Robot {
                 match terms.iter_mut().find(|t| t.joint == joint && t.of == of) {
                     Some(term) => term.ratio += angle,
                     None => terms.push(CouplingTerm { joint, of, ratio: angle }),
-                }
-            }
-            Parameter::Alpha(i) | Parameter::A(i) | Parameter::Beta(i) | Parameter::Theta(i) | Parameter::D(i) => {
-                let Some(joint) = self.joints.get_mut(i) else { return };
-                match parameter {
-                    Parameter::Alpha(_) => joint.alpha_rad += angle,
-                    Parameter::A(_) => joint.a_mm += delta,
-                    Parameter::Beta(_) => joint.beta_rad += angle,
-                    Parameter::Theta(_) => joint.theta_rad += angle,
-                    _ => joint.d_mm += delta,
                 }
             }
         }

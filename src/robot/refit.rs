@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use super::inverse::{self, ARM_MM};
 use super::jacobian::Screws;
 use super::{Corrections, Parameter, Robot};
-use crate::geometry::rotation_vector;
 
 /// Postures that are fitted, and those that the rest is judged at (others).
 const FITTED: usize = 600;
@@ -107,9 +106,7 @@ impl Robot {
             columns.fixed_view_mut::<3, 1>(3, k).copy_from(&(screws.rotation_column(parameter, [1.0, 0.0]) * ARM_MM));
         }
         let (wanted, there) = (self.base_from_flange(q), plain.base_from_flange(q));
-        let mut residual = DVector::zeros(6);
-        residual.fixed_rows_mut::<3>(0).copy_from(&(wanted.translation.vector - there.translation.vector));
-        residual.fixed_rows_mut::<3>(3).copy_from(&(rotation_vector(&(wanted * there.inverse())) * ARM_MM));
+        let residual = DVector::from_column_slice(inverse::off(&wanted, &there, ARM_MM).as_slice());
         (columns.tr_mul(&columns), columns.tr_mul(&residual))
     }
 }

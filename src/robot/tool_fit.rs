@@ -87,7 +87,7 @@ impl Robot {
 /// See [`Robot::fit_tool`].
 fn fit(all: &[Row], tool_mm: Vector3<f64>, from: Start) -> Option<ToolFit> {
     let spread_mm = middle_spread(&all.iter().map(|row| row.point).collect::<Vec<_>>())?;
-    let of_start = |tool| without_gross(all, from_start(all, tool), descended);
+    let of_start = |tool| without_gross(all, descended(all, placed(all, &tool), tool), descended);
     let left = |(frame, tool): &(Transform, Vector3<f64>)| middle(all, frame, tool);
     let mut best = of_start(tool_mm);
     if from == Start::Around && left(&best) > SETTLED * spread_mm {
@@ -172,12 +172,7 @@ fn placed(rows: &[Row], tool: &Vector3<f64>) -> Transform {
     fitted_frame(rows.iter().map(|row| (row.flange * Point3::from(*tool), Point3::from(row.point), 1.0)))
 }
 
-/// The least squares of placement and tool from this tool on.
-fn from_start(rows: &[Row], tool: Vector3<f64>) -> (Transform, Vector3<f64>) {
-    descended(rows, placed(rows, &tool), tool)
-}
-
-/// The same from this placement and tool on.
+/// The least squares of placement and tool from these on.
 fn descended(rows: &[Row], mut frame: Transform, mut tool: Vector3<f64>) -> (Transform, Vector3<f64>) {
     let residuals = |frame: &Transform, tool: &Vector3<f64>| -> Vec<Vector3<f64>> {
         rows.iter().map(|r| r.off(frame, tool)).collect()

@@ -5,7 +5,6 @@
 
 use std::f64::consts::PI;
 
-/// What a formula says.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Value {
     pub number: f64,

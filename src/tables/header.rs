@@ -24,13 +24,8 @@ pub struct Headed {
 /// Columns from which on names that count them are no readings.
 const COUNTED: usize = 4;
 
-/// Finds the names of a grid.
-pub fn split(grid: &Grid) -> Result<Headed> {
-    split_by(grid, &is_number)
-}
-
-/// The same of a grid whose numbers are written in another way as well.
-pub fn split_by(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
+/// Finds the names of a grid; `is_number` says which of its cells are numbers.
+pub fn split(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
     let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number));
     let Some(mut first) = first else {
         let records = grid.rows.iter().flat_map(|(_, row)| row.iter()).any(|cell| cell.starts_with("[{"));
@@ -68,12 +63,7 @@ pub fn split_by(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed>
 }
 
 /// The rows of a grid whose columns are named otherwise, whatever stands above them.
-pub fn rows_alone(grid: &Grid) -> Result<Headed> {
-    rows_alone_by(grid, &is_number)
-}
-
-/// The same of a grid whose numbers are written in another way as well.
-pub fn rows_alone_by(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
+pub fn rows_alone(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
     let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number)).unwrap_or(0);
     Ok(Headed { names: None, rows: even(grid, first, 0)? })
 }
@@ -263,7 +253,7 @@ mod tests {
 
     fn read(text: &str) -> Result<Headed> {
         let (_folder, path) = files::temporary("t.csv", text);
-        split(&Grid::read(&path, "the table", "")?)
+        split(&Grid::read(&path, "the table", "")?, &is_number)
     }
 
     fn names(text: &str) -> Option<Vec<String>> {

@@ -17,19 +17,22 @@ pub enum Unit {
     Inch,
 }
 
+/// Each unit with its word in a sentence, that of `--units`, and the words by which it is known.
+const UNITS: [(Unit, &str, &str, &[&str]); 7] = [
+    (Unit::Deg, "degrees", "deg", &["deg", "degree", "degrees", "°", "º", "grad"]),
+    (Unit::Rad, "radians", "rad", &["rad", "radian", "radians"]),
+    (Unit::Mm, "mm", "mm", &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]),
+    (Unit::M, "m", "m", &["m", "meter", "meters", "metre", "metres"]),
+    (Unit::Um, "um", "um", &["um", "µm", "μm", "micron", "microns"]),
+    (Unit::Cm, "cm", "cm", &["cm"]),
+    (Unit::Inch, "inches", "inches", &["in", "inch", "inches"]),
+];
+
 impl Unit {
     /// From a word such as `mm`, `deg` or `°`.
     pub fn of(word: &str) -> Option<Unit> {
-        match word.trim().to_lowercase().as_str() {
-            "deg" | "degree" | "degrees" | "°" | "º" | "grad" => Some(Unit::Deg),
-            "rad" | "radian" | "radians" => Some(Unit::Rad),
-            "mm" | "millimeter" | "millimeters" | "millimetre" | "millimetres" => Some(Unit::Mm),
-            "m" | "meter" | "meters" | "metre" | "metres" => Some(Unit::M),
-            "um" | "µm" | "μm" | "micron" | "microns" => Some(Unit::Um),
-            "cm" => Some(Unit::Cm),
-            "in" | "inch" | "inches" => Some(Unit::Inch),
-            _ => None,
-        }
+        let word = word.trim().to_lowercase();
+        UNITS.iter().find(|(.., known)| known.contains(&word.as_str())).map(|(unit, ..)| *unit)
     }
 
     /// Whether it is one of angles.
@@ -51,24 +54,12 @@ impl Unit {
 
     /// For a sentence.
     pub fn word(self) -> &'static str {
-        match self {
-            Unit::Deg => "degrees",
-            Unit::Rad => "radians",
-            Unit::Mm => "mm",
-            Unit::M => "m",
-            Unit::Um => "um",
-            Unit::Cm => "cm",
-            Unit::Inch => "inches",
-        }
+        UNITS[self as usize].1
     }
 
     /// As `--units` has it.
     pub fn flag(self) -> &'static str {
-        match self {
-            Unit::Deg => "deg",
-            Unit::Rad => "rad",
-            _ => self.word(),
-        }
+        UNITS[self as usize].2
     }
 }
 
@@ -90,9 +81,7 @@ pub enum What {
 /// A column's name, understood.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Name {
-    /// What it holds.
     pub what: What,
-    /// The unit that it states.
     pub unit: Option<Unit>,
     /// What else the name says, to tell one set of columns from another.
     pub key: Vec<String>,
@@ -136,7 +125,6 @@ impl Name {
         self.key.iter().find(|word| counts && is_in(UNREAD, word)).map(String::as_str)
     }
 
-    /// Reads a name.
     pub fn of(name: &str) -> Name {
         let name = name.trim().trim_start_matches(['#', '%']).trim();
         if let Some(own) = OWN.iter().find(|own| name.eq_ignore_ascii_case(own)) {

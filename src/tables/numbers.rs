@@ -20,10 +20,11 @@ impl Style {
         let (mut by_commas, mut by_points, mut decimal) = (false, false, false);
         for cell in cells.filter(|cell| cell.contains(',') && cell.len() < 40 || cell.matches('.').count() > 1) {
             let cell = bare(cell);
-            by_commas |=
-                ungrouped(&cell, ',', '.').is_some_and(|_| cell.contains('.') || cell.matches(',').count() > 1);
-            by_points |=
-                ungrouped(&cell, '.', ',').is_some_and(|_| cell.contains(',') || cell.matches('.').count() > 1);
+            let sets_apart = |by: char, decimal: char| {
+                ungrouped(&cell, by, decimal).is_some() && (cell.contains(decimal) || cell.matches(by).count() > 1)
+            };
+            by_commas |= sets_apart(',', '.');
+            by_points |= sets_apart('.', ',');
             decimal |= is_decimal_comma(&cell);
         }
         let both = by_commas && (by_points || decimal);
@@ -80,14 +81,8 @@ fn bare(cell: &str) -> String {
 
 /// A number whose digits are set apart in threes, without what sets them apart and with its decimals as they are but for the point.
 fn ungrouped(cell: &str, by: char, decimal: char) -> Option<String> {
-    let (sign, rest) = match cell.strip_prefix(['+', '-']) {
-        Some(rest) => (&cell[..1], rest),
-        None => ("", cell),
-    };
-    let (whole, decimals) = match rest.split_once(decimal) {
-        Some((whole, decimals)) => (whole, Some(decimals)),
-        None => (rest, None),
-    };
+    let (sign, rest) = cell.split_at(usize::from(cell.starts_with(['+', '-'])));
+    let (whole, decimals) = rest.split_once(decimal).map_or((rest, None), |(whole, behind)| (whole, Some(behind)));
     let mut groups = whole.split(by);
     let first = groups.next()?;
     let digits = |text: &str| text.chars().all(|c| c.is_ascii_digit());

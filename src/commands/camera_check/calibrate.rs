@@ -12,7 +12,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::{Provenance, Run, are_among, hash_of_picture};
 use crate::formats::calibration::CalibrationFile;
-use crate::formats::camera_check::CameraCheckFile;
+use crate::formats::camera_check;
 use crate::formats::lenses;
 use crate::imaging::board::SQUARES_MM;
 use crate::imaging::board::printed::Printed;
@@ -76,7 +76,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     }
     calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 
-    let file = CameraCheckFile::new(&calibration, &judged);
+    let file = camera_check::content(&calibration, &judged);
     let pictures = pictures(args, pairing.as_ref(), &calibration, &judged);
     let page = report::camera_check::page(&calibration, &judged, &corners, &pictures)?;
     out.write_json("calibration.json", &CalibrationFile::from(calibration.rig()).with_check(&calibration, &judged))?;

@@ -11,7 +11,7 @@ use crate::config::{self, Config};
 use crate::files::OutDir;
 use crate::files::provenance::{Provenance, Run, are_among, hash_of_picture};
 use crate::formats::calibration::{self, Calibrated};
-use crate::formats::recheck::{self as formats, Check, HISTORY, RecheckFile, Standing};
+use crate::formats::recheck::{self as formats, Check, HISTORY, Standing};
 use crate::imaging::corners::named;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
@@ -64,9 +64,9 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm)
         .by(whole.is_some())
         .beside(!found.strays.is_empty());
-    let content = RecheckFile::new(&found, standing, &file, tolerance_mm);
+    let content = formats::content(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
-    checks.push(Check::new(&content, date));
+    checks.push(Check::new(&found, standing, &file, date));
     let page = report::recheck::page(&found, standing, tolerance_mm, &checks, &warnings)?;
     let json = out.write_json("recheck.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "pairs").as_bytes())?;

@@ -33,7 +33,7 @@ impl Program {
         order: &JointOrder,
     ) -> files::Result<Program> {
         let path = &args.targets;
-        let bytes = files::read_text_bytes(path, "robot program")?;
+        let bytes = files::read_text_bytes(path, "robot program", None)?;
         let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
         let Some((text, encoding)) = programs::decoded(bytes) else {
             return Err(refuse("robot program: UTF-16 text".to_owned(), "save it as UTF-8, or as the controller does"));

@@ -12,7 +12,7 @@ use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
 use crate::formats::recheck::{self as formats, Check};
-use crate::formats::robot_recheck::{HISTORY, RobotRecheckFile};
+use crate::formats::robot_recheck::{self, HISTORY};
 use crate::formats::robots::known;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
@@ -64,27 +64,28 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
     let found = Recheck { tolerance_mm, ..compared((&set, &robot), against, &before, &placed)? };
-    let content = RobotRecheckFile::new(&found, against, tolerance_mm, whole.is_some() || own.all);
+    let standing = robot_recheck::standing(&found, tolerance_mm, whole.is_some() || own.all);
+    let content = robot_recheck::content(&found, standing, against, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
     checks.push(Check {
         date,
         against: against.to_string(),
         pairs: found.poses.len(),
-        standing: content.standing,
+        standing,
         cause: found.cause(),
         effect_mm: found.effect_mm,
         seen_mm: found.seen_mm,
         length_mm: None,
     });
     let advised_against = check.is_some_and(|check| check.advice == Advice::DoNotUse);
-    let judged = Judged { standing: content.standing, tolerance_mm, advised_against, is_mended: is_mended.is_some() };
+    let judged = Judged { standing, tolerance_mm, advised_against, is_mended: is_mended.is_some() };
     let page = report::robot_recheck::page(&found, judged, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;
     let summary = || report::robot_recheck::summary(&found, judged, checks.len(), &out);
     let least = if advised_against || is_mended.is_some() { Status::OutOfTolerance } else { Status::Done };
-    let status = content.standing.status().or_worse(least);
+    let status = standing.status().or_worse(least);
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
 }
 

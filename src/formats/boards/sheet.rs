@@ -44,7 +44,6 @@ pub(super) struct Patch {
 /// A board on a sheet of paper.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sheet {
-    /// The paper's name.
     pub paper: &'static str,
     pub width_mm: f64,
     pub height_mm: f64,
@@ -56,7 +55,6 @@ pub struct Sheet {
     numbers: Vec<(String, (f64, f64))>,
 }
 
-/// A board that no paper holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TooLarge {
     /// Its size and that of the largest paper.

@@ -6,7 +6,6 @@ use crate::stereo::{Camera, Error, Lens};
 /// Metres in a millimetre.
 pub(in crate::formats) const METRE: f64 = 1e-3;
 
-/// A file to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExportedFile {
     /// Its name in the results folder.

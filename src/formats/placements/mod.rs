@@ -18,7 +18,6 @@ pub struct Frames {
     pub target: String,
 }
 
-/// One placement to write.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Placement<'a> {
     pub frames: &'a Frames,

@@ -146,8 +146,7 @@ impl PlacementFile {
         let all = file.groups.iter().map(|group| &group.base_from_rig).chain(&file.flange_from_target);
         for record in all {
             let Some(rotation) = record.rotation else { continue };
-            let matrix = Matrix3::from_fn(|r, c| rotation[r][c]);
-            checked::rotation("a rotation", matrix)
+            checked::rotation("a rotation", Matrix3::from_fn(|r, c| rotation[r][c]))
                 .map_err(|message| files::Error::format(path, None, message, Some(hint)))?;
         }
         Ok(file)

@@ -14,7 +14,6 @@ mod ends;
 mod link;
 mod lists;
 mod matrix;
-mod numbered;
 mod repeated;
 mod robots;
 mod scan;
@@ -34,11 +33,9 @@ use crate::tables::expression::Value;
 /// Why a sliding joint is refused that no call of a toolbox makes.
 const SLIDES: &str = "a joint slides here, which only the calls of a toolbox (`Prismatic`), `type: prismatic` beside a link's parameters and a table's column `type` say of its row: write a table, a row a joint";
 
-/// What a text holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Text {
     pub links: Option<Links>,
-    /// What the words say.
     pub words: Words,
     /// The names that the text sets to numbers.
     pub known: Known,
@@ -51,9 +48,7 @@ pub struct Links {
     pub rows: Vec<(u64, [Value; 4])>,
     /// What the calls that make links or the numbers in names show, and how that is said.
     pub convention: Option<(Convention, &'static str)>,
-    /// How the calls contradict each other.
     pub contradiction: Option<String>,
-    /// Which joints slide.
     pub slides: Vec<bool>,
     /// Which joints count the other way.
     pub flipped: Vec<bool>,
@@ -99,7 +94,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
     let Scan { mut links, lists, families, numbered, wrong, .. } = scan;
     let others = || -> Result<(Vec<Link>, Option<Convention>), Wrong> {
         let of_lists = lists::links(&lists, &families)?;
-        Ok(if of_lists.is_empty() { numbered::links(&numbered) } else { (of_lists, None) })
+        Ok(if of_lists.is_empty() { lists::numbered_links(&numbered) } else { (of_lists, None) })
     };
     // What a loop takes out of lists is no number where the link is made.
     if let Some(wrong) = wrong {

@@ -7,7 +7,6 @@
 use crate::robot::catalogue::Convention;
 use crate::tables::names::Unit;
 
-/// What the words say.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Words {
     pub convention: Option<Convention>,

@@ -64,10 +64,8 @@ impl Identified {
 #[derive(Debug, Deserialize)]
 struct Expected {
     mean_mm: f64,
-    #[serde(default)]
     scatter_mm: Option<f64>,
     p95_mm: f64,
-    #[serde(default)]
     freedom: Option<f64>,
     #[serde(default)]
     joint_ranges: Vec<[f64; 2]>,

@@ -14,7 +14,6 @@ pub mod urdf_plain;
 
 use crate::robot::Robot;
 
-/// A robot in some format.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExportedRobot {
     pub name: &'static str,

@@ -22,7 +22,6 @@ use crate::tables::expression;
 pub enum Kind {
     /// Turns, with or without limits.
     Revolute,
-    /// Slides.
     Prismatic,
     /// Holds.
     Fixed,
@@ -53,7 +52,6 @@ pub struct UrdfJoint {
     origin_at: Result<std::ops::Range<usize>, usize>,
 }
 
-/// A description.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Urdf {
     pub name: String,
@@ -93,7 +91,6 @@ impl Urdf {
         Urdf::parse(text, path)
     }
 
-    /// Understands the text of a file.
     pub fn parse(text: String, path: &Utf8Path) -> Result<Urdf> {
         let refuse = |line, message: String, hint| files::Error::format(path, line, message, hint);
         let text = without_declaration(text);
@@ -111,12 +108,12 @@ impl Urdf {
             let hint = "expand it first: `xacro FILE > robot.urdf`";
             return Err(refuse(None, "the file is a xacro, a description with macros in it".to_owned(), Some(hint)));
         }
+        let read = |node: Node| {
+            let line = u64::from(document.text_pos_at(node.range().start).row);
+            joint(&node, line).map_err(|message| refuse(Some(line), message, None))
+        };
         let elements = root.children().filter(|n| n.has_tag_name("joint"));
-        let line = |node: &Node| u64::from(document.text_pos_at(node.range().start).row);
-        let mut joints = Vec::new();
-        for node in elements {
-            joints.push(joint(&node, line(&node)).map_err(|message| refuse(Some(line(&node)), message, None))?);
-        }
+        let joints = elements.map(read).collect::<Result<Vec<UrdfJoint>>>()?;
         let links = root.children().filter(|n| n.has_tag_name("link")).filter_map(|n| n.attribute("name"));
         let roots: Vec<&str> = links.filter(|link| !joints.iter().any(|j| j.child == *link)).collect();
         let [root_link] = roots[..] else {

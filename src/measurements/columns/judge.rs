@@ -163,7 +163,6 @@ pub(in crate::measurements) fn usual(candidates: &[Picked], forced: Forced) -> V
     candidates.iter().flat_map(|picked| units.map(|units| way(picked, units))).collect()
 }
 
-/// Judges all ways.
 pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], robot: &Robot, forced: Forced) -> Verdict {
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
     let guessed = |p: &Picked| p.columns().any(|at| unknown(&at));
@@ -279,26 +278,21 @@ fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
 
 /// Degrees, where a joint is beyond a turn in radians.
 pub(in crate::measurements) fn angle_by_size(parts: &[Part], picked: &Picked) -> Option<Unit> {
-    (largest(parts, &mut picked.joints.iter().copied()) > TAU).then_some(Unit::Deg)
+    (largest(parts, picked.joints.iter().copied()) > TAU).then_some(Unit::Deg)
 }
 
 /// The largest number of these columns.
-fn largest(parts: &[Part], columns: &mut dyn Iterator<Item = At>) -> f64 {
-    let mut most = 0.0f64;
-    for at in columns {
-        for row in 0..parts[at.part].rows.len() {
-            most = most.max(parts[at.part].optional(row, at.column).ok().flatten().unwrap_or(0.0).abs());
-        }
-    }
-    most
+fn largest(parts: &[Part], columns: impl Iterator<Item = At>) -> f64 {
+    let number = |at: At, row: usize| parts[at.part].optional(row, at.column).ok().flatten().unwrap_or(0.0).abs();
+    columns.flat_map(|at| (0..parts[at.part].rows.len()).map(move |row| number(at, row))).fold(0.0, f64::max)
 }
 
 /// Units by the sizes of the numbers, where they leave no choice.
 fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Verdict {
     let joints = forced.joints.or(picked.joint_unit).or_else(|| angle_by_size(parts, picked));
-    let mut measured = picked.points.iter().flat_map(|(_, at)| *at).chain(picked.distance);
+    let measured = picked.points.iter().flat_map(|(_, at)| *at).chain(picked.distance);
     let lengths =
-        forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, &mut measured) > METRES).then_some(Unit::Mm));
+        forced.lengths.or(picked.length_unit).or_else(|| (largest(parts, measured) > METRES).then_some(Unit::Mm));
     match (joints, lengths) {
         (Some(joints), Some(lengths)) => {
             let judged = ways.iter().find(|way| way.joints == joints && way.lengths == lengths).cloned();

@@ -65,8 +65,8 @@ impl Part {
         }
         let headed = match grid.form {
             Form::Program { .. } => header::Headed { names: None, rows: grid.rows.clone() },
-            _ => match header::split(&grid) {
-                Err(_) if named => header::rows_alone(&grid)?,
+            _ => match header::split(&grid, &header::is_number) {
+                Err(_) if named => header::rows_alone(&grid, &header::is_number)?,
                 headed => headed?,
             },
         };
@@ -82,10 +82,7 @@ impl Part {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
         let part = Part { grid, names: headed.names, meanings, rows: headed.rows, kinds, key: None, times: 1, below };
-        match part.unread_unit().filter(|_| !named) {
-            Some(error) => Err(error),
-            None => Ok(part),
-        }
+        part.unread_unit().filter(|_| !named).map_or(Ok(part), Err)
     }
 
     /// That a column is in a unit that is not read.
@@ -166,10 +163,8 @@ impl Part {
 
     /// A column as a message calls it.
     pub fn column_name(&self, column: usize) -> String {
-        match self.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty()) {
-            Some(name) => name.clone(),
-            None => format!("column {}", column + 1),
-        }
+        let name = self.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());
+        name.cloned().unwrap_or_else(|| format!("column {}", column + 1))
     }
 
     /// The number of a cell, or none where the cell says so.

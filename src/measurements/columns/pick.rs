@@ -77,34 +77,29 @@ pub(in crate::measurements) fn check_lengths(parts: &[Part], picked: &Picked, ro
     Ok(())
 }
 
-/// The unit that a column states.
 fn unit(parts: &[Part], at: &At) -> Option<Unit> {
     parts[at.part].meanings.as_ref()?[at.column].unit
 }
 
 /// A set of columns that belong together.
-struct Group {
-    key: Vec<String>,
-    unit: Option<Unit>,
-    measured: Option<bool>,
+struct Group<'a> {
+    /// That of the first column.
+    name: &'a Name,
     columns: Vec<(usize, At)>,
 }
 
-fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group> {
+fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group<'_>> {
     let mut list: Vec<Group> = Vec::new();
     for (part, meanings) in parts.iter().enumerate().filter_map(|(i, p)| Some((i, p.meanings.as_ref()?))) {
         for (column, name) in meanings.iter().enumerate() {
             let Some(number) = number(name) else { continue };
             let at = (number, At { part, column });
             // One number in two units is of two sets.
-            let other = |g: &Group| g.unit != name.unit && g.columns.iter().any(|(n, _)| *n == number);
-            let same = |g: &&mut Group| g.key == name.key && g.columns[0].1.part == part && !other(g);
+            let other = |g: &Group| g.name.unit != name.unit && g.columns.iter().any(|(n, _)| *n == number);
+            let same = |g: &&mut Group| g.name.key == name.key && g.columns[0].1.part == part && !other(g);
             match list.iter_mut().find(same) {
                 Some(group) => group.columns.push(at),
-                None => {
-                    let (key, unit, measured) = (name.key.clone(), name.unit, name.measured);
-                    list.push(Group { key, unit, measured, columns: vec![at] });
-                }
+                None => list.push(Group { name, columns: vec![at] }),
             }
         }
     }
@@ -163,7 +158,7 @@ fn joint_number(name: &Name) -> Option<usize> {
 }
 
 fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
-    let mut complete: Vec<(Vec<At>, Option<bool>)> = Vec::new();
+    let mut complete: Vec<Vec<At>> = Vec::new();
     let mut largest: Option<(usize, usize)> = None;
     for mut group in groups(parts, joint_number) {
         group.columns.sort_unstable();
@@ -173,14 +168,14 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         let first = group.columns[0].0;
         let without_gap = group.columns.iter().zip(first..).all(|((n, _), i)| *n == i);
         if group.columns.len() == count && without_gap && first < 2 {
-            complete.push((group.columns.iter().map(|(_, at)| *at).collect(), group.measured));
+            complete.push(group.columns.iter().map(|(_, at)| *at).collect());
         } else if largest.is_none_or(|(most, _)| group.columns.len() > most) {
             largest = Some((group.columns.len(), group.columns[0].1.part));
         }
     }
     if complete.len() > 1 {
         // Where the robot was sent and where it says that it is: the identified robot corrects commands.
-        let (first, second) = (&complete[0].0, &complete[1].0);
+        let (first, second) = (&complete[0], &complete[1]);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
         // Nothing of the points where they are not clear.
         let points = points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default();
@@ -189,7 +184,7 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
     match (complete.pop(), largest) {
-        (Some((columns, _)), _) => Ok(columns),
+        (Some(columns), _) => Ok(columns),
         (None, Some((found, part))) if found >= 3 && !parts.iter().any(|p| !p.free().is_empty()) => {
             let message = format!(
                 "{found} columns of joints, but the robot has {count} joints, counted from 1 or 0 without a gap"
@@ -210,19 +205,19 @@ fn points(parts: &[Part]) -> Result<Vec<(String, [At; 3], Option<bool>)>> {
         let of_axis = |axis: usize| group.columns.iter().filter(move |(a, _)| *a == axis).map(|(_, at)| *at);
         let all = [0, 1, 2].map(|axis| of_axis(axis).collect::<Vec<At>>());
         if let [[a, d], [b, e], [c, f]] = all.each_ref().map(Vec::as_slice)
-            && group.measured != Some(false)
+            && group.name.measured != Some(false)
         {
             return Err(asked(parts, &[], [&[*a, *b, *c], &[*d, *e, *f]], false));
         }
         for found in all {
-            if found.len() > 1 && group.measured != Some(false) {
+            if found.len() > 1 && group.name.measured != Some(false) {
                 return Err(twice(parts, "a coordinate", &found));
             }
         }
         let [Some(x), Some(y), Some(z)] = [0, 1, 2].map(|axis| of_axis(axis).next()) else { continue };
-        match group.measured {
+        match group.name.measured {
             Some(false) => commanded = Some([x, y, z]),
-            measured => sets.push((group.key, [x, y, z], measured)),
+            measured => sets.push((group.name.key.clone(), [x, y, z], measured)),
         }
     }
     sets.extend(translations(parts));
@@ -282,7 +277,7 @@ fn translations(parts: &[Part]) -> Vec<(Vec<String>, [At; 3], Option<bool>)> {
         let at = |entry: usize| group.columns.iter().find(|(n, _)| *n == entry).map(|(_, at)| *at);
         let entries = if at(0).is_some() || at(3).is_some() { [3, 13, 23] } else { [14, 24, 34] };
         let [x, y, z] = entries.map(at);
-        Some((group.key, [x?, y?, z?], group.measured))
+        Some((group.name.key.clone(), [x?, y?, z?], group.name.measured))
     };
     groups(parts, number).into_iter().filter_map(translation).collect()
 }

@@ -38,10 +38,8 @@ pub struct Arm {
     pub note: &'static str,
     /// How the rows are to be read.
     pub convention: Convention,
-    /// One a joint.
-    pub rows: &'static [Row],
-    /// Ranges, deg; one a joint.
-    pub limits_deg: &'static [[f64; 2]],
+    /// A row a joint, and its range, deg.
+    pub joints: &'static [(Row, [f64; 2])],
     /// The flange against the last frame: turns about x, y and z in this order, deg.
     pub flange_deg: [f64; 3],
     /// Joints (from 0) whose readings count from the level: the reading of the second must be added to the first.
@@ -50,8 +48,9 @@ pub struct Arm {
 
 impl Arm {
     pub fn robot(&self) -> Robot {
-        let mut robot = from_rows(self.title, self.convention, self.rows);
-        for (joint, [low, high]) in robot.joints.iter_mut().zip(self.limits_deg) {
+        let rows: Vec<Row> = self.joints.iter().map(|(row, _)| *row).collect();
+        let mut robot = from_rows(self.title, self.convention, &rows);
+        for (joint, (_, [low, high])) in robot.joints.iter_mut().zip(self.joints) {
             joint.limits_rad = Some((low.to_radians(), high.to_radians()));
         }
         let turn = |axis: Vector3<f64>, deg: f64| transform(axis * deg.to_radians(), Vector3::zeros());
@@ -70,20 +69,15 @@ impl Arm {
 pub fn from_rows(name: &str, convention: Convention, rows: &[Row]) -> Robot {
     let mut ends = Ends::default();
     let mut before = [0.0, 0.0];
-    let mut joints = Vec::with_capacity(rows.len());
-    for &[alpha_deg, a_mm, theta_deg, d_mm] in rows {
-        let [alpha, a] = match convention {
+    let joint = |&[alpha_deg, a_mm, theta_deg, d_mm]: &Row| {
+        let [alpha, a_mm] = match convention {
             Convention::Modified => [alpha_deg, a_mm],
             Convention::Classic => std::mem::replace(&mut before, [alpha_deg, a_mm]),
         };
-        joints.push(Joint {
-            alpha_rad: alpha.to_radians(),
-            a_mm: a,
-            theta_rad: theta_deg.to_radians(),
-            d_mm,
-            ..Joint::default()
-        });
-    }
+        let (alpha_rad, theta_rad) = (alpha.to_radians(), theta_deg.to_radians());
+        Joint { alpha_rad, a_mm, theta_rad, d_mm, ..Joint::default() }
+    };
+    let joints = rows.iter().map(joint).collect();
     if convention == Convention::Classic && before != [0.0, 0.0] {
         let along: Transform = Transform::translation(before[1], 0.0, 0.0);
         ends.last_frame_from_flange = along * transform(Vector3::x() * before[0].to_radians(), Vector3::zeros());

@@ -8,7 +8,7 @@
 use super::arm::{Arm, Convention};
 use crate::robot::Robot;
 
-const UR_LIMITS: &[[f64; 2]] = &[[-360.0, 360.0]; 6];
+const UR_LIMITS: [f64; 2] = [-360.0, 360.0];
 const UR_SOURCE: &str = "Universal Robots, \"DH parameters for calculations of kinematics and dynamics\"";
 
 macro_rules! ur {
@@ -19,15 +19,14 @@ macro_rules! ur {
             source: UR_SOURCE,
             note: "a calibrated machine reports other numbers; `export robot --format ur-calibration` writes them",
             convention: Convention::Classic,
-            rows: &[
-                [90.0, 0.0, 0.0, $d1],
-                [0.0, $a2, 0.0, 0.0],
-                [0.0, $a3, 0.0, 0.0],
-                [90.0, 0.0, 0.0, $d4],
-                [-90.0, 0.0, 0.0, $d5],
-                [0.0, 0.0, 0.0, $d6],
+            joints: &[
+                ([90.0, 0.0, 0.0, $d1], UR_LIMITS),
+                ([0.0, $a2, 0.0, 0.0], UR_LIMITS),
+                ([0.0, $a3, 0.0, 0.0], UR_LIMITS),
+                ([90.0, 0.0, 0.0, $d4], UR_LIMITS),
+                ([-90.0, 0.0, 0.0, $d5], UR_LIMITS),
+                ([0.0, 0.0, 0.0, $d6], UR_LIMITS),
             ],
-            limits_deg: UR_LIMITS,
             flange_deg: [0.0; 3],
             coupled: &[],
         }
@@ -37,22 +36,21 @@ macro_rules! ur {
 const IRB1200_SOURCE: &str = "ABB, product specification IRB 1200 (3HAC046982), dimensions and working range";
 
 macro_rules! abb {
-    ($name:literal, $title:literal, $source:expr, $d1:literal, $a2:literal, $a3:literal, $d4:literal, $d6:literal, $limits:expr) => {
+    ($name:literal, $title:literal, $source:expr, [$d1:literal, $a2:literal, $a3:literal, $d4:literal, $d6:literal], $limits:expr) => {
         Arm {
             name: $name,
             title: $title,
             source: $source,
             note: "",
             convention: Convention::Modified,
-            rows: &[
-                [0.0, 0.0, 0.0, $d1],
-                [-90.0, 0.0, -90.0, 0.0],
-                [0.0, $a2, 0.0, 0.0],
-                [-90.0, $a3, 0.0, $d4],
-                [90.0, 0.0, 0.0, 0.0],
-                [-90.0, 0.0, 0.0, $d6],
+            joints: &[
+                ([0.0, 0.0, 0.0, $d1], $limits[0]),
+                ([-90.0, 0.0, -90.0, 0.0], $limits[1]),
+                ([0.0, $a2, 0.0, 0.0], $limits[2]),
+                ([-90.0, $a3, 0.0, $d4], $limits[3]),
+                ([90.0, 0.0, 0.0, 0.0], $limits[4]),
+                ([-90.0, 0.0, 0.0, $d6], $limits[5]),
             ],
-            limits_deg: $limits,
             flange_deg: [0.0, 0.0, 180.0],
             coupled: &[],
         }
@@ -65,34 +63,22 @@ pub const ARMS: &[Arm] = &[
         "abb-irb120",
         "ABB IRB 120-3/0.6",
         "ABB, product specification IRB 120 (3HAC035960), dimensions and working range",
-        290.0,
-        270.0,
-        70.0,
-        302.0,
-        72.0,
-        &[[-165.0, 165.0], [-110.0, 110.0], [-110.0, 70.0], [-160.0, 160.0], [-120.0, 120.0], [-400.0, 400.0]]
+        [290.0, 270.0, 70.0, 302.0, 72.0],
+        [[-165.0, 165.0], [-110.0, 110.0], [-110.0, 70.0], [-160.0, 160.0], [-120.0, 120.0], [-400.0, 400.0]]
     ),
     abb!(
         "abb-irb1200-5-0.9",
         "ABB IRB 1200-5/0.9",
         IRB1200_SOURCE,
-        399.1,
-        448.0,
-        42.0,
-        451.0,
-        82.0,
-        &[[-170.0, 170.0], [-100.0, 130.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
+        [399.1, 448.0, 42.0, 451.0, 82.0],
+        [[-170.0, 170.0], [-100.0, 130.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
     ),
     abb!(
         "abb-irb1200-7-0.7",
         "ABB IRB 1200-7/0.7",
         IRB1200_SOURCE,
-        399.1,
-        350.0,
-        42.0,
-        351.0,
-        82.0,
-        &[[-170.0, 170.0], [-100.0, 135.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
+        [399.1, 350.0, 42.0, 351.0, 82.0],
+        [[-170.0, 170.0], [-100.0, 135.0], [-200.0, 70.0], [-270.0, 270.0], [-130.0, 130.0], [-360.0, 360.0]]
     ),
     Arm {
         name: "fanuc-lrmate200id",
@@ -100,21 +86,13 @@ pub const ARMS: &[Arm] = &[
         source: "Fanuc, LR Mate 200iD data sheet, dimensions and motion range; base at the mounting plane",
         note: "the pendant's J3 counts from the level, not from link 2: [couplings] adds J2 to it",
         convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 330.0],
-            [-90.0, 50.0, -90.0, 0.0],
-            [180.0, 330.0, 0.0, 0.0],
-            [-90.0, 35.0, 0.0, -335.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, -80.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-100.0, 145.0],
-            [-140.0, 280.0],
-            [-190.0, 190.0],
-            [-125.0, 125.0],
-            [-360.0, 360.0],
+        joints: &[
+            ([0.0, 0.0, 0.0, 330.0], [-170.0, 170.0]),
+            ([-90.0, 50.0, -90.0, 0.0], [-100.0, 145.0]),
+            ([180.0, 330.0, 0.0, 0.0], [-140.0, 280.0]),
+            ([-90.0, 35.0, 0.0, -335.0], [-190.0, 190.0]),
+            ([90.0, 0.0, 0.0, 0.0], [-125.0, 125.0]),
+            ([-90.0, 0.0, 0.0, -80.0], [-360.0, 360.0]),
         ],
         flange_deg: [180.0, 0.0, 0.0],
         coupled: &[(2, 1)],
@@ -125,23 +103,14 @@ pub const ARMS: &[Arm] = &[
         source: "Franka Robotics, FCI documentation, \"Denavit-Hartenberg parameters\" (Craig's) and joint limits of the Panda",
         note: "the flange, without a hand; the Research 3 has narrower limits",
         convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 333.0],
-            [-90.0, 0.0, 0.0, 0.0],
-            [90.0, 0.0, 0.0, 316.0],
-            [90.0, 82.5, 0.0, 0.0],
-            [-90.0, -82.5, 0.0, 384.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [90.0, 88.0, 0.0, 107.0],
-        ],
-        limits_deg: &[
-            [-166.0, 166.0],
-            [-101.0, 101.0],
-            [-166.0, 166.0],
-            [-176.0, -4.0],
-            [-166.0, 166.0],
-            [-1.0, 215.0],
-            [-166.0, 166.0],
+        joints: &[
+            ([0.0, 0.0, 0.0, 333.0], [-166.0, 166.0]),
+            ([-90.0, 0.0, 0.0, 0.0], [-101.0, 101.0]),
+            ([90.0, 0.0, 0.0, 316.0], [-166.0, 166.0]),
+            ([90.0, 82.5, 0.0, 0.0], [-176.0, -4.0]),
+            ([-90.0, -82.5, 0.0, 384.0], [-166.0, 166.0]),
+            ([90.0, 0.0, 0.0, 0.0], [-1.0, 215.0]),
+            ([90.0, 88.0, 0.0, 107.0], [-166.0, 166.0]),
         ],
         flange_deg: [0.0; 3],
         coupled: &[],
@@ -152,23 +121,14 @@ pub const ARMS: &[Arm] = &[
         source: "KUKA, LBR iiwa 14 R820 specification, dimensions and axis ranges",
         note: "the bare flange; a media flange adds to d_7",
         convention: Convention::Classic,
-        rows: &[
-            [-90.0, 0.0, 0.0, 360.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [90.0, 0.0, 0.0, 420.0],
-            [-90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, 400.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 126.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-120.0, 120.0],
-            [-170.0, 170.0],
-            [-120.0, 120.0],
-            [-170.0, 170.0],
-            [-120.0, 120.0],
-            [-175.0, 175.0],
+        joints: &[
+            ([-90.0, 0.0, 0.0, 360.0], [-170.0, 170.0]),
+            ([90.0, 0.0, 0.0, 0.0], [-120.0, 120.0]),
+            ([90.0, 0.0, 0.0, 420.0], [-170.0, 170.0]),
+            ([-90.0, 0.0, 0.0, 0.0], [-120.0, 120.0]),
+            ([-90.0, 0.0, 0.0, 400.0], [-170.0, 170.0]),
+            ([90.0, 0.0, 0.0, 0.0], [-120.0, 120.0]),
+            ([0.0, 0.0, 0.0, 126.0], [-175.0, 175.0]),
         ],
         flange_deg: [0.0; 3],
         coupled: &[],
@@ -179,21 +139,13 @@ pub const ARMS: &[Arm] = &[
         source: "KUKA, KR AGILUS sixx specification, dimensions and axis data",
         note: "",
         convention: Convention::Modified,
-        rows: &[
-            [180.0, 0.0, 0.0, -400.0],
-            [90.0, 25.0, 0.0, 0.0],
-            [0.0, 455.0, -90.0, 0.0],
-            [90.0, 35.0, 0.0, -420.0],
-            [-90.0, 0.0, 0.0, 0.0],
-            [90.0, 0.0, 180.0, -80.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-190.0, 45.0],
-            [-120.0, 156.0],
-            [-185.0, 185.0],
-            [-120.0, 120.0],
-            [-350.0, 350.0],
+        joints: &[
+            ([180.0, 0.0, 0.0, -400.0], [-170.0, 170.0]),
+            ([90.0, 25.0, 0.0, 0.0], [-190.0, 45.0]),
+            ([0.0, 455.0, -90.0, 0.0], [-120.0, 156.0]),
+            ([90.0, 35.0, 0.0, -420.0], [-185.0, 185.0]),
+            ([-90.0, 0.0, 0.0, 0.0], [-120.0, 120.0]),
+            ([90.0, 0.0, 180.0, -80.0], [-350.0, 350.0]),
         ],
         flange_deg: [180.0, 0.0, 0.0],
         coupled: &[],
@@ -211,21 +163,13 @@ pub const ARMS: &[Arm] = &[
         source: "Yaskawa, MOTOMAN-GP7 specification, dimensions and range of motion; base at the mounting plane",
         note: "",
         convention: Convention::Modified,
-        rows: &[
-            [0.0, 0.0, 0.0, 330.0],
-            [-90.0, 40.0, -90.0, 0.0],
-            [180.0, 445.0, 0.0, 0.0],
-            [-90.0, 40.0, 0.0, -440.0],
-            [90.0, 0.0, 0.0, 0.0],
-            [-90.0, 0.0, 0.0, -80.0],
-        ],
-        limits_deg: &[
-            [-170.0, 170.0],
-            [-65.0, 145.0],
-            [-70.0, 190.0],
-            [-190.0, 190.0],
-            [-135.0, 135.0],
-            [-360.0, 360.0],
+        joints: &[
+            ([0.0, 0.0, 0.0, 330.0], [-170.0, 170.0]),
+            ([-90.0, 40.0, -90.0, 0.0], [-65.0, 145.0]),
+            ([180.0, 445.0, 0.0, 0.0], [-70.0, 190.0]),
+            ([-90.0, 40.0, 0.0, -440.0], [-190.0, 190.0]),
+            ([90.0, 0.0, 0.0, 0.0], [-135.0, 135.0]),
+            ([-90.0, 0.0, 0.0, -80.0], [-360.0, 360.0]),
         ],
         flange_deg: [180.0, 0.0, 0.0],
         coupled: &[],
@@ -312,8 +256,7 @@ mod tests {
     #[test]
     fn every_arm_has_limits_that_hold_zero_or_say_why_not() {
         for arm in ARMS {
-            assert_eq!(arm.rows.len(), arm.limits_deg.len(), "{}", arm.name);
-            let without_zero = arm.limits_deg.iter().filter(|[low, high]| *low > 0.0 || *high < 0.0).count();
+            let without_zero = arm.joints.iter().filter(|(_, [low, high])| *low > 0.0 || *high < 0.0).count();
             assert_eq!(without_zero, usize::from(arm.name == "franka-panda"), "{}", arm.name);
         }
     }

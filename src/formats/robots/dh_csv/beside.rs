@@ -65,13 +65,11 @@ impl Table<'_> {
         let beta = only(&|name| name.eq_ignore_ascii_case("beta_deg"));
         let bounds = only(&|name| side(name) == Some(-1)).zip(only(&|name| side(name) == Some(1)));
         let kind = self.kind();
-        let slides = self.sliding(kind)?;
+        let slides = self.sliding()?;
         let (mut beta_deg, mut limits_deg) = (Vec::new(), Vec::new());
         for (line, row) in self.rows {
-            let of = |column: Option<usize>| match column.filter(|&c| !row[c].is_empty()) {
-                Some(column) => self.number(*line, row, column).map(|v| Some(v.number)),
-                None => Ok(None),
-            };
+            let number = |column: usize| self.number(*line, row, column).map(|v| v.number);
+            let of = |column: Option<usize>| column.filter(|&c| !row[c].is_empty()).map(number).transpose();
             beta_deg.push(of(beta)?);
             limits_deg.push(match (of(bounds.map(|b| b.0))?, of(bounds.map(|b| b.1))?, bounds) {
                 (Some(low), Some(high), Some((of_low, of_high))) if low >= high => {
@@ -104,12 +102,13 @@ impl Table<'_> {
     }
 
     /// The column that says whether a joint turns or slides.
-    pub(super) fn kind(&self) -> Option<usize> {
+    fn kind(&self) -> Option<usize> {
         self.only(&is_of_kind)
     }
 
     /// Which rows are of joints that slide. A column of other words, of motors for one, says nothing of it.
-    pub(super) fn sliding(&self, kind: Option<usize>) -> Result<Vec<bool>> {
+    pub(super) fn sliding(&self) -> Result<Vec<bool>> {
+        let kind = self.kind();
         let of_row = |(_, row): &(u64, Fields)| kind.and_then(|column| slides(&row[column]));
         let said: Vec<Option<bool>> = self.rows.iter().map(of_row).collect();
         let unknown = said.iter().position(Option::is_none).filter(|_| said.iter().any(Option::is_some));

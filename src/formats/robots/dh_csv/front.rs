@@ -171,8 +171,8 @@ fn without_names(table: &Table) -> Result<Vec<Reading>> {
 fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Reading>> {
     let given = given(asked);
     let Headed { names, rows } = match given {
-        Some(_) => header::rows_alone_by(grid, &is_number)?,
-        None => header::split_by(grid, &is_number)?,
+        Some(_) => header::rows_alone(grid, &is_number)?,
+        None => header::split(grid, &is_number)?,
     };
     let width = rows.first().map_or(0, |(_, row)| row.len());
     if let Some(given) = given.as_ref().filter(|given| given.len() != width) {

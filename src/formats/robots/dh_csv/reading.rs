@@ -56,7 +56,6 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// The robot of this table.
     pub fn robot(&self, name: &str, convention: Convention) -> Robot {
         let mut robot = from_rows(name, convention, &self.rows);
         for (joint, (beta, limits)) in robot.joints.iter_mut().zip(self.beta_deg.iter().zip(&self.limits_deg)) {

@@ -44,7 +44,7 @@ impl Table<'_> {
         let theta = columns[2];
         let turns = |row: &(u64, Fields)| self.value(&row.1[theta]).is_some_and(|v| v.variable);
         // What is no number, or slides, is said of the cell.
-        let slides = self.sliding(self.kind())?;
+        let slides = self.sliding()?;
         let stands = |(row, slides): &(&(u64, Fields), &bool)| {
             !**slides && columns.iter().all(|&c| self.value(&row.1[c]).is_some_and(|v| !v.variable))
         };
@@ -68,7 +68,7 @@ impl Table<'_> {
     pub fn numbers(&self, columns: [usize; 4]) -> Result<(Vec<Row>, bool)> {
         let mut numbers: Vec<Row> = Vec::with_capacity(self.rows.len());
         let mut radians = false;
-        let slides = self.sliding(self.kind())?;
+        let slides = self.sliding()?;
         for ((line, row), slides) in self.rows.iter().zip(slides) {
             let mut of_row = [0.0; 4];
             for (which, (slot, &column)) in of_row.iter_mut().zip(&columns).enumerate() {

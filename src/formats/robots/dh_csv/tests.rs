@@ -54,14 +54,13 @@ fn the_ends_of_a_table_show_its_convention_where_no_word_says_it() {
     assert_eq!(of("alpha_deg,a_mm,theta_deg,d_mm\n90,0,0,310\n0,225,0,0\n0,80,0,9\n"), Some(Convention::Modified));
     assert_eq!(of("alpha_deg,a_mm,theta_deg,d_mm\n90,0,0,310\n0,225,0,0\n0,0,0,9\n"), Some(Convention::Classic));
     assert_eq!(of("theta_i,d_i,a_(i-1),alpha_{i-1}\n0,310,0,90\n0,0,225,0\n0,9,0,0\n"), Some(Convention::Modified));
-    let said = |text: &str| crate::diagnostic::report(&all(text).unwrap_err());
-    assert!(said(&classic.replace("q3,0.1", "0,d3")).contains("`d3` is not a number"));
-    assert!(said(&classic.replace("q3,0.1", "0,q3")).contains("slides"));
+    assert!(said("dh.csv", &classic.replace("q3,0.1", "0,d3")).contains("`d3` is not a number"));
+    assert!(said("dh.csv", &classic.replace("q3,0.1", "0,q3")).contains("slides"));
     // Of rows that turn and rows that do not the last may be the flange.
     let flange = all(&format!("{classic}0,0.2,0,0\n")).unwrap();
     assert!(flange[0].rows == all(classic).unwrap()[0].rows && flange[0].said.starts_with("4 joints"));
-    assert!(said(&classic.replace("q3,0.1", "0,0.1")).contains("does not turn"));
-    assert!(said(&classic.replace("q2 - pi/2", "q2 - 90")).contains("in radians stand beside one of 90"));
+    assert!(said("dh.csv", &classic.replace("q3,0.1", "0,0.1")).contains("does not turn"));
+    assert!(said("dh.csv", &classic.replace("q2 - pi/2", "q2 - 90")).contains("in radians stand beside one of 90"));
     let words = "Link Length (a<sub>i-1</sub>),Link Twist (α<sub>i-1</sub>),Joint Offset (d<sub>i</sub>),Joint Angle (θ<sub>i</sub>)\n0,0,310,θ<sub>1</sub>\n0,-90,0,\\theta_2 - 90\n520,0,0,θ<sub>3</sub>\n";
     let found = all(words).unwrap();
     assert_eq!((found[0].rows[1], found[0].convention().0), ([-90.0, 0.0, -90.0, 0.0], Some(Convention::Modified)));
@@ -94,10 +93,9 @@ fn formulas_in_the_first_rows_are_no_names_and_a_column_says_what_slides() {
 fn without_names_every_order_that_could_be_is_offered() {
     let found = all("0, 0, 487, 0\n-90, 85, 0, -90\n0, 640, 12.5, 0\n").unwrap();
     assert!(found.len() > 1 && found.iter().any(|r| r.columns == "alpha,a,d,theta"), "{found:?}");
-    let said = |text: &str| crate::diagnostic::report(&all(text).unwrap_err());
-    assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n1.5708,85,0,0\n0,640,1.5708,12\n").contains("radians"));
-    assert!(said("alpha_deg,a_mm,theta_deg,d_mm\n90,0.085,0,0\n0,0.640,0,0\n").contains("metres"));
-    assert!(said("alpha,a,theta\n90,85,0\n0,640,0\n").contains("no column `d_mm`"));
+    assert!(said("dh.csv", "alpha_deg,a_mm,theta_deg,d_mm\n1.5708,85,0,0\n0,640,1.5708,12\n").contains("radians"));
+    assert!(said("dh.csv", "alpha_deg,a_mm,theta_deg,d_mm\n90,0.085,0,0\n0,0.640,0,0\n").contains("metres"));
+    assert!(said("dh.csv", "alpha,a,theta\n90,85,0\n0,640,0\n").contains("no column `d_mm`"));
 }
 
 #[test]

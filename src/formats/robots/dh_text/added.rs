@@ -3,7 +3,7 @@
 //! In: code, and the links that its calls make. Out: a refusal with the line of what cannot be followed. What goes wrong: what the text
 //! does between is not run, so that a list which is cut short afterwards is not seen.
 
-use super::link::{CALLS, Link, Wrong};
+use super::link::{Link, Wrong, makes};
 use super::lists::up_to;
 use super::robots;
 
@@ -15,18 +15,19 @@ pub(super) fn none(code: &str, links: &[Link]) -> Result<(), Wrong> {
     if !links.iter().any(|link| link.call) {
         return Ok(());
     }
-    let makes = |text: &str| CALLS.iter().any(|call| calls(text, call));
-    let is_link = |name: &str| assigned(code, name).any(makes);
     let line_of = |at: usize| 1 + code[..at].matches('\n').count() as u64;
-    let adds = ADDS.iter().flat_map(|word| code.match_indices(word));
-    let mut adds: Vec<(usize, &str)> = adds.collect();
+    let mut adds: Vec<(usize, &str)> = ADDS.iter().flat_map(|word| code.match_indices(word)).collect();
     adds.sort_unstable();
     for (at, word) in adds {
         let list = code[..at].trim_end().rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or("");
         let behind = &code[at + word.len()..];
         let added = &behind[..up_to(behind, &['\n'])];
-        let of_links = is_link(list) || added.contains(".links") || code.contains(&format!("{list}.append(Revolute"));
-        if of_links && !makes(added) && !added.split(',').all(|name| is_link(name.trim().trim_matches(['[', ']']))) {
+        let of_links =
+            is_link(code, list) || added.contains(".links") || code.contains(&format!("{list}.append(Revolute"));
+        if of_links
+            && !makes(added)
+            && !added.split(',').all(|name| is_link(code, name.trim().trim_matches(['[', ']'])))
+        {
             let statement = match word.ends_with('(') {
                 true => format!("{list}{word}{added})"),
                 false => format!("{list} {word} {}", added.trim()),
@@ -43,24 +44,17 @@ pub(super) fn none(code: &str, links: &[Link]) -> Result<(), Wrong> {
     })
 }
 
-/// Whether a text calls something of that name.
-pub(super) fn calls(text: &str, call: &str) -> bool {
-    text.match_indices(call).any(|(at, _)| {
-        let alone = !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
-        alone && text[at + call.len()..].trim_start_matches(' ').starts_with('(')
-    })
+/// Whether a name is set to a link.
+pub(super) fn is_link(code: &str, name: &str) -> bool {
+    assigned(code, name).any(makes)
 }
 
 /// What is assigned to a name, each to the end of its statement.
-pub(super) fn assigned<'a>(code: &'a str, name: &str) -> impl Iterator<Item = &'a str> {
-    let wanted = (!name.is_empty()).then(|| name.to_owned());
-    let all = wanted.into_iter().flat_map(move |name| {
-        let found = code.match_indices(name.as_str()).map(|(at, _)| at).collect::<Vec<_>>();
-        found.into_iter().map(move |at| (at, name.len()))
-    });
-    all.filter_map(move |(at, length)| {
+fn assigned<'a>(code: &'a str, name: &'a str) -> impl Iterator<Item = &'a str> {
+    code.match_indices(name).filter(move |_| !name.is_empty()).filter_map(move |(at, name)| {
         let alone = !code[..at].ends_with(|c: char| c.is_alphanumeric() || matches!(c, '_' | '.'));
-        let value = code[at + length..].trim_start_matches(' ').strip_prefix('=').filter(|v| !v.starts_with('='))?;
+        let behind = code[at + name.len()..].trim_start_matches(' ');
+        let value = behind.strip_prefix('=').filter(|value| !value.starts_with('='))?;
         alone.then(|| &value[..up_to(value, &['\n', ';'])])
     })
 }

@@ -101,10 +101,7 @@ fn product(code: &str, known: &Known, text: &str, depth: usize) -> Option<Transf
     while !rest.is_empty() {
         let end = up_to(rest, &['*', '@']);
         all *= factor(code, known, rest[..end].trim(), depth)?;
-        rest = match rest.get(end + 1..) {
-            Some(behind) => behind.trim(),
-            None => "",
-        };
+        rest = rest.get(end + 1..).unwrap_or("").trim();
     }
     (!text.trim().is_empty()).then_some(all)
 }

@@ -15,6 +15,20 @@ pub type Wrong = (u64, String);
 pub(super) const CALLS: [&str; 8] =
     ["RevoluteDH", "RevoluteMDH", "PrismaticDH", "PrismaticMDH", "DHLink", "Link", "Revolute", "Prismatic"];
 
+/// Where a text calls something of that name, and what stands behind the bracket.
+pub(super) fn calls<'a>(text: &'a str, call: &'a str) -> impl Iterator<Item = (usize, &'a str)> {
+    text.match_indices(call).filter_map(move |(at, _)| {
+        let alone = !text[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+        let behind = text[at + call.len()..].trim_start_matches(' ').strip_prefix('(');
+        behind.filter(|_| alone).map(|inside| (at, inside))
+    })
+}
+
+/// Whether a call in it makes a link.
+pub(super) fn makes(text: &str) -> bool {
+    CALLS.iter().any(|call| calls(text, call).next().is_some())
+}
+
 /// Names of the parameters, in the order of a row.
 pub(super) const KEYS: [&[&str]; 4] = [
     &["alpha", "α", "twist", "link_twist"],

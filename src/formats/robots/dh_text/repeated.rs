@@ -3,16 +3,12 @@
 //! In: code, and the links that its calls make. Out: the code with a list of calls that a whole number multiplies written out, and a refusal with the line
 //! of any other. What goes wrong: a function that makes links and is called several times is not seen.
 
-use super::added::calls;
-use super::link::{CALLS, Link, Wrong};
+use super::added::is_link;
+use super::link::{CALLS, Link, Wrong, calls, makes};
 use super::lists::up_to;
 
 /// Links of one list that are written out at the most.
 const MOST: usize = 20;
-
-fn makes(text: &str) -> bool {
-    CALLS.iter().any(|call| calls(text, call))
-}
 
 fn refused(code: &str, at: usize, what: &str) -> Wrong {
     let message = format!(
@@ -60,41 +56,26 @@ pub(super) fn expanded(code: &str) -> Result<String, Wrong> {
     Ok(text)
 }
 
-/// Whether a name is set to a link.
-fn is_link(code: &str, name: &str) -> bool {
-    super::added::assigned(code, name).any(makes)
-}
-
 /// Refuses links that a loop, a comprehension or a copy makes.
 pub(super) fn refuse_unwritten(code: &str, links: &[Link]) -> Result<(), Wrong> {
     if !links.iter().any(|link| link.call) {
         return Ok(());
     }
     for call in CALLS {
-        for (at, _) in code.match_indices(call) {
-            let alone = !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
-            let Some(inside) = code[at + call.len()..].trim_start_matches(' ').strip_prefix('(').filter(|_| alone)
-            else {
-                continue;
-            };
+        for (at, inside) in calls(code, call) {
             let behind = inside.get(up_to(inside, &[]) + 1..).unwrap_or("").trim_start();
             // Behind a whole statement a loop begins.
             let in_brackets = code[..at].matches(['[', '(']).count() > code[..at].matches([']', ')']).count();
             let what = match () {
                 () if in_brackets && behind.starts_with("for ") => "a comprehension",
                 () if in_loop(code, at) => "a loop",
-                () if in_repmat(code, at) => "`repmat`",
+                () if code[..at].rsplit(['\n', ';']).next().is_some_and(|of| of.contains("repmat(")) => "`repmat`",
                 () => continue,
             };
             return Err(refused(code, at, what));
         }
     }
     Ok(())
-}
-
-fn in_repmat(code: &str, at: usize) -> bool {
-    let statement = code[..at].rsplit(['\n', ';']).next().unwrap_or("");
-    statement.contains("repmat(")
 }
 
 /// Whether a place is in the body of a loop: of Python by the indents, of MATLAB before the `end`.

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use super::link::Wrong;
+use super::link::{Wrong, calls};
 use super::lists::{extent, up_to};
 
 /// Calls that make a robot of links.
@@ -60,13 +60,10 @@ pub(super) fn of_one(code: &str, links: &[u64]) -> Result<(), Wrong> {
 
 fn made(code: &str) -> Vec<Made<'_>> {
     let mut made = Vec::new();
-    for at in CALLS.iter().flat_map(|call| code.match_indices(call)) {
-        let before = &code[..at.0];
-        let Some(inside) = code[at.0 + at.1.len()..].trim_start_matches(' ').strip_prefix('(') else { continue };
+    for (at, inside) in CALLS.iter().flat_map(|call| calls(code, call)) {
+        let before = &code[..at];
         let statement = before.rsplit(['\n', ';']).next().unwrap_or("");
-        let declares = ["def ", "class ", "function ", "classdef "];
-        if before.ends_with(|c: char| c.is_alphanumeric() || c == '_') || declares.iter().any(|w| statement.contains(w))
-        {
+        if ["def ", "class ", "function ", "classdef "].iter().any(|word| statement.contains(word)) {
             continue;
         }
         let end = up_to(inside, &[]);

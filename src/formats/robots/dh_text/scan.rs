@@ -6,8 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::link::{CALLS, KEYS, Known, Link, Wrong};
-use super::lists::{self, Lists, extent, list};
-use super::numbered;
+use super::lists::{self, Lists, Numbered, extent, list};
 use crate::formats::robots::dh_words::slides;
 use crate::tables::expression::{Value, evaluate};
 
@@ -23,7 +22,7 @@ pub(super) struct Scan<'a> {
     pub(super) lists: Lists,
     /// Lists whose names have the same before the parameter's.
     pub(super) families: BTreeMap<String, Lists>,
-    pub(super) numbered: numbered::Numbered,
+    pub(super) numbered: Numbered,
     /// The first value that is no number.
     pub(super) wrong: Option<Wrong>,
 }
@@ -118,7 +117,7 @@ impl Scan<'_> {
                 None if self.depth > 0 && !text.trim().is_empty() => self.no_number(word, text.trim()),
                 _ => {}
             }
-        } else if let Some((which, number)) = numbered::parameter(word)
+        } else if let Some((which, number)) = lists::numbered(word)
             && let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2)
         {
             self.numbered[which].entry(number).or_insert((self.line, v));
