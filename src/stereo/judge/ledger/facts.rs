@@ -88,6 +88,19 @@ impl Evidence {
         let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), case.facts.tolerance_mm);
         Evidence { what, remedy, value: value_mm, limit: Some(case.facts.tolerance_mm), unit: "mm", allows, detail }
     }
+
+    /// A figure beside its limit, which casts doubt on a rig where it is not kept.
+    pub(super) fn of_doubt(
+        what: &'static str,
+        remedy: &'static str,
+        [value, limit]: [f64; 2],
+        unit: &'static str,
+        is_kept: bool,
+        detail: String,
+    ) -> Evidence {
+        let allows = if is_kept { Verdict::Pass } else { Verdict::Undecided };
+        Evidence { what, remedy, value: Some(value), limit: Some(limit), unit, allows, detail }
+    }
 }
 
 impl Case<'_> {
