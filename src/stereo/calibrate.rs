@@ -137,21 +137,12 @@ impl Calibration {
 
 /// Calibrates both cameras and the rig from the pairs that belong together.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    calibrate_with(corners, options, false)
+    calibrate_by(corners, options, false, false)
 }
 
 /// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
-/// can be found over the series.
-pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
-    calibrate_by(corners, options, runs, false)
-}
-
-/// The same with the lenses that the pairs tell, whatever each camera alone tells of them; runs stay in.
-pub fn calibrate_by_pairs(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    calibrate_by(corners, options, true, true)
-}
-
-fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
+/// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them.
+pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
@@ -214,13 +205,10 @@ fn solved_by(
     let mut below = None;
     loop {
         let choice = choose(below)?;
-        let Choice { layout, near, priors, .. } = &choice;
-        let values = near.clone().unwrap_or_else(|| start.values.clone());
-        let solved = Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout);
-        match solved.and_then(|solved| Ok((solved.uncertainty(layout)?, solved))) {
+        match choice.solve(start).and_then(|solved| Ok((solved.uncertainty(&choice.layout)?, solved))) {
             Ok((uncertainty, solved)) => return Ok((choice, solved, uncertainty)),
             Err(error) if choice.simpler().is_none() => return Err(error),
-            Err(_) => below = layout.left,
+            Err(_) => below = choice.layout.left,
         }
     }
 }

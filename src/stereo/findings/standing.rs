@@ -10,7 +10,7 @@ use nalgebra::DVector;
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
-use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by_pairs, calibrate_with};
+use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
 use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, rolling_shutter, without_drift};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -52,7 +52,7 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
 }
 
 fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut with_runs = calibrate_with(corners, &asked.options, true);
+    let mut with_runs = calibrate_by(corners, &asked.options, true, false);
     let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
     if with_runs.as_ref().is_ok_and(|found| found.each_alone)
         && let Some((by_pairs, change)) = by_pairs(corners, asked)
@@ -78,7 +78,7 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
 /// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig by more than each camera
 /// misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and looks like something that moved between the two.
 fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
-    let found = calibrate_by_pairs(corners, &asked.options).ok().filter(|found| found.runs == 0)?;
+    let found = calibrate_by(corners, &asked.options, true, true).ok().filter(|found| found.runs == 0)?;
     let change = change(&found, asked).filter(|change| change.kind == Kind::Drift)?;
     let still = without_drift::at_share(&found, corners, &asked.options, change.along.as_ref()?, MIDDLE)?;
     (!still.each_alone).then_some((found, change))

@@ -18,8 +18,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::missed::Missed;
-use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
+use crate::stereo::pairs::{Cause, DiscardedPair, Missed, mixups, moved, numbering};
 use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
 

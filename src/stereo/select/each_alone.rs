@@ -14,7 +14,7 @@ use crate::stereo::init::board_pose;
 use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Covariance, KnownLenses, Layout, Shared, Values};
-use crate::stereo::pairs::missed::Missed;
+use crate::stereo::pairs::Missed;
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Camera, Lens, Rig};

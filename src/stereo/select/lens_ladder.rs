@@ -11,7 +11,7 @@
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
-use crate::stereo::pairs::missed::Missed;
+use crate::stereo::pairs::Missed;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, KnownScatter, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
@@ -35,12 +35,9 @@ pub fn choose(
     }
     let of_pairs = of_pairs(start, board, options).map(|choice| choice.below(below));
     let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
-    let of = |Choice { layout, near, priors, .. }: &Choice| {
-        let values = near.clone().unwrap_or_else(|| start.values.clone());
-        Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout).ok()
-    };
-    let lens = of_pairs.as_ref().ok().and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
-    let paired = of_pairs.as_ref().ok().and_then(of);
+    let chosen = of_pairs.as_ref().ok();
+    let lens = chosen.and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
+    let paired = chosen.and_then(|choice| choice.solve(start).ok());
     let Some(known) = each_alone::lenses(start, board, lens, paired.as_ref(), missed) else { return of_pairs };
     let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
     let choice = known_lenses::choose(start, &known, options)?;
