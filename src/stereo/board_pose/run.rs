@@ -191,12 +191,8 @@ impl<'a> Run<'a> {
         });
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY, grows: false };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed {
-            explanations: vec![explanation],
-            moves_mm,
-            beyond: f64::INFINITY,
-            scaled_mm: None,
-        }))
+        let explanations = vec![explanation];
+        Some(Judgement::Contradicts(Changed { explanations, moves_mm, beyond: f64::INFINITY, scaled_mm: None }))
     }
 
     /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
@@ -253,14 +249,8 @@ impl<'a> Run<'a> {
             });
             MeasuredPose { at, target: Err(refusal) }
         });
-        Series {
-            poses: poses.collect(),
-            judgement,
-            excess: 1.0,
-            usual_excess: 1.0,
-            notes: self.notes,
-            ..Series::default()
-        }
+        let poses = poses.collect();
+        Series { poses, judgement, excess: 1.0, usual_excess: 1.0, notes: self.notes, ..Series::default() }
     }
 }
 

@@ -127,14 +127,8 @@ fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f6
             let added = richer.count().checked_sub(layout.count())?;
             let chi_square_fall = (chosen.chi_square - trial.chi_square) / factor;
             let step = step(layout, &chosen.values.shared, &trial.values.shared);
-            let rig = trial.values.shared.rig;
-            (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(Witness {
-                layout: richer,
-                rig,
-                added,
-                chi_square_fall,
-                step,
-            })
+            let witness = Witness { layout: richer, rig: trial.values.shared.rig, added, chi_square_fall, step };
+            (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(witness)
         })
         .collect()
 }

@@ -14,13 +14,9 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     let extremes = &case.facts.accuracy.extremes;
     let worst = &extremes.largest;
     let doubtful = &case.facts.accuracy.doubtful;
-    let left_out = if doubtful.lengths_left_out > 0 {
-        format!(
-            "; {} lengths that end in doubtful corners are not counted (see the check of rays)",
-            doubtful.lengths_left_out
-        )
-    } else {
-        String::new()
+    let left_out = match doubtful.lengths_left_out {
+        0 => String::new(),
+        n => format!("; {n} lengths that end in doubtful corners are not counted (see the check of rays)"),
     };
     let board_mm = worst.expansion.board_mm.unwrap_or_default();
     // What is left of the tolerance beside an uncertain board decides nothing about pictures.
@@ -176,14 +172,9 @@ pub(super) fn folds(case: &Case) -> Evidence {
     let changes = case.facts.accuracy.fold_steps.iter().map(|step| case.facts.volume.most_changed_mm(layout, step));
     let value = changes.fold(0.0, f64::max);
     let unchecked = &case.facts.accuracy.unchecked;
-    let alone = if unchecked.is_empty() {
-        String::new()
-    } else {
-        format!(
-            ". Without {} the others do not determine the cameras: nothing checks what it says",
-            unchecked.join(", ")
-        )
-    };
+    let names = unchecked.join(", ");
+    let alone = format!(". Without {names} the others do not determine the cameras: nothing checks what it says");
+    let alone = if unchecked.is_empty() { String::new() } else { alone };
     let detail = format!(
         "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block{alone}",
         case.facts.volume.length_mm
