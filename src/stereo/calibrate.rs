@@ -3,7 +3,7 @@
 //! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::print_share;
@@ -19,7 +19,7 @@ use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
-use crate::stereo::solve::{Priors, Problem, Solved, Uncertainty};
+use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
@@ -33,8 +33,8 @@ pub struct Calibration {
     pub views: Vec<View>,
     /// Rig, shape, a pose a pair; the rig carries its covariance.
     pub values: Values,
-    /// Covariance of the shared numbers and of each pose.
-    pub uncertainty: Uncertainty,
+    /// Covariance of the shared numbers, in the layout's order.
+    pub covariance: DMatrix<f64>,
     /// How corners scatter.
     pub noise: Noise,
     /// The same without the board's print: what pictures of another board scatter by.
@@ -156,19 +156,19 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
     let neighbours = solved.problem.neighbours();
     let inflation = solved.inflation();
-    let by_noise = by_corners.scaled(inflation);
-    let without_scatter = by_noise.shared.clone();
+    let by_noise = by_corners * inflation;
+    let without_scatter = by_noise.clone();
     let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
-    let Stated { mut uncertainty, pair_scatter, witnesses } =
+    let Stated { mut covariance, pair_scatter, witnesses } =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {
-        uncertainty.shared += print.covariance - without_scatter;
+        covariance += print.covariance - without_scatter;
         own_noise = print.own_noise;
     }
-    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
+    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: covariance.clone() });
     Ok(Calibration {
         board: corners.board,
         layout,
@@ -192,7 +192,7 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
         lens_scores,
         views,
         values,
-        uncertainty,
+        covariance,
     })
 }
 
@@ -201,12 +201,12 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
 fn solved_by(
     start: &Problem,
     choose: impl Fn(Option<Lens>) -> Result<Choice, Error>,
-) -> Result<(Choice, Solved, Uncertainty), Error> {
+) -> Result<(Choice, Solved, DMatrix<f64>), Error> {
     let mut below = None;
     loop {
         let choice = choose(below)?;
-        match choice.solve(start).and_then(|solved| Ok((solved.uncertainty(&choice.layout)?, solved))) {
-            Ok((uncertainty, solved)) => return Ok((choice, solved, uncertainty)),
+        match choice.solve(start).and_then(|solved| Ok((solved.covariance(&choice.layout)?, solved))) {
+            Ok((covariance, solved)) => return Ok((choice, solved, covariance)),
             Err(error) if choice.simpler().is_none() => return Err(error),
             Err(_) => below = choice.layout.left,
         }

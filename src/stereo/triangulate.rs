@@ -147,9 +147,11 @@ impl RigCovariance {
         RigCovariance { numbers, covariance: covariance.clone() }
     }
 
-    /// Variance of a quantity with these derivatives by the rig's numbers.
-    pub fn variance(&self, by_rig: impl Fn(usize) -> f64) -> f64 {
-        let slopes: Vec<(usize, f64)> = self.numbers.iter().map(|&(at, number)| (at, by_rig(number))).collect();
+    /// Variance of the length between two points through the calibration, mm^2: its share is common to both.
+    pub fn length_variance_mm2(&self, a: &SpacePoint, b: &SpacePoint) -> f64 {
+        let direction = (b.point_mm - a.point_mm).normalize();
+        let slope = |number: usize| direction.dot(&(b.by_rig[number] - a.by_rig[number]));
+        let slopes: Vec<(usize, f64)> = self.numbers.iter().map(|&(at, number)| (at, slope(number))).collect();
         let mut sum = 0.0;
         for &(i, a) in &slopes {
             for &(j, b) in &slopes {
@@ -157,12 +159,6 @@ impl RigCovariance {
             }
         }
         sum
-    }
-
-    /// Variance of the length between two points through the calibration, mm^2: its share is common to both.
-    pub fn length_variance_mm2(&self, a: &SpacePoint, b: &SpacePoint) -> f64 {
-        let direction = (b.point_mm - a.point_mm).normalize();
-        self.variance(|number| direction.dot(&(b.by_rig[number] - a.by_rig[number])))
     }
 }
 

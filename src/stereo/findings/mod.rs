@@ -311,6 +311,8 @@ fn finding(
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
     let cause = Cause::words(equals.iter().map(|c| c.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)));
+    let Change { common, gain, scatter, .. } = shown.change.clone();
+    let along = Along { whole, common, by_pair: best.by_pair.clone(), gain, scatter };
     Some(Finding {
         remedy: hold(&cause, None),
         cause,
@@ -320,13 +322,7 @@ fn finding(
         unit,
         effect_mm: Some(effect_mm),
         action,
-        along: Some(Along {
-            whole,
-            common: shown.change.common.clone(),
-            by_pair: best.by_pair.clone(),
-            gain: shown.change.gain,
-            scatter: shown.change.scatter,
-        }),
+        along: Some(along),
     })
 }
 

@@ -279,8 +279,8 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
 
 /// Adds steps that the rig may be off by to its uncertainty.
 fn allow_for(found: &mut Calibration, steps: &[DVector<f64>]) {
-    steps.iter().for_each(|step| found.uncertainty.shared += step * step.transpose());
-    let matrix = found.uncertainty.shared.clone();
+    steps.iter().for_each(|step| found.covariance += step * step.transpose());
+    let matrix = found.covariance.clone();
     found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
 }
 

@@ -76,16 +76,9 @@ pub struct Camera {
 impl Camera {
     /// A camera without distortion.
     pub fn pinhole(width: u32, height: u32, focal_px: f64) -> Camera {
-        Camera {
-            width,
-            height,
-            fx: focal_px,
-            fy: focal_px,
-            cx: (f64::from(width) - 1.0) / 2.0,
-            cy: (f64::from(height) - 1.0) / 2.0,
-            lens: Lens::Radial2,
-            distortion: [0.0; 14],
-        }
+        let [cx, cy] = [width, height].map(|size| (f64::from(size) - 1.0) / 2.0);
+        let (lens, distortion) = (Lens::Radial2, [0.0; 14]);
+        Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens, distortion }
     }
 
     /// Where a point in the camera's frame (mm, any scale) falls in the raw picture, px. The point must lie in front (z > 0).

@@ -131,7 +131,7 @@ fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<S
     }
     let wide = Layout::rig(Lens::Rational8, layout.shape);
     let solved = Problem { values: simplest.problem.values.clone(), ..start.clone() }.solve(&wide).ok()?;
-    solved.uncertainty(&wide).ok()?;
+    solved.covariance(&wide).ok()?;
     let added = (wide.count() - layout.count()) as f64;
     let gain = solved.log_likelihood - simplest.log_likelihood;
     (2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
@@ -155,7 +155,7 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
 /// them are free and the pairs do not tell them apart, the terms after them do not need them.
 fn priors_of_forced(start: &Problem, layout: &Layout) -> Priors {
     let holds = layout.left > Some(Lens::Rational8)
-        && start.solve(layout).and_then(|solved| solved.uncertainty(layout)).is_err();
+        && start.solve(layout).and_then(|solved| solved.covariance(layout)).is_err();
     if holds { start.priors.holding_rational() } else { start.priors.clone() }
 }
 

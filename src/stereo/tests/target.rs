@@ -181,7 +181,6 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
         let off = target.cam_from_board.translation.vector - world.poses[3].translation.vector;
         let own = target.covariance.fixed_view::<3, 3>(3, 3).into_owned();
         let chi_square = off.dot(&(own.try_inverse().unwrap() * off));
-        println!("{times}: refused {refused}, variance {grown:.1} times, off by {chi_square:.1}");
         if refused {
             kept += 1;
             assert!(grown > 4.0 && chi_square < 25.0, "{times}: {grown}, {chi_square}");

@@ -203,14 +203,12 @@ fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
 /// The rows' and the columns' directions of boards with the least and the most of these tilts, deg: about x, then about y.
 fn directions_of_tilts([x_least, x_most, y_least, y_most]: [f64; 4]) -> Vec<Vector3<f64>> {
     let tilts = [(x_least, y_least), (x_least, y_most), (x_most, y_least), (x_most, y_most)];
-    tilts
-        .into_iter()
-        .flat_map(|(x, y)| {
-            let normal = Vector3::new(y.to_radians().tan(), x.to_radians().tan(), 1.0).normalize();
-            let row = (Vector3::x() - normal * normal.x).normalize();
-            [row, normal.cross(&row)]
-        })
-        .collect()
+    let directions = |(x, y): (f64, f64)| {
+        let normal = Vector3::new(y.to_radians().tan(), x.to_radians().tan(), 1.0).normalize();
+        let row = (Vector3::x() - normal * normal.x).normalize();
+        [row, normal.cross(&row)]
+    };
+    tilts.into_iter().flat_map(directions).collect()
 }
 
 /// Refuses a box of which both cameras see nothing.
@@ -226,11 +224,8 @@ pub fn check(calibration: &Calibration, extent: Extent) -> Result<(), Error> {
 
 /// A lattice through the box in the left camera's frame that the boards' corners filled, or that is asked for.
 fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
-    let points = calibration
-        .views
-        .iter()
-        .zip(&calibration.values.poses)
-        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
+    let pairs = calibration.views.iter().zip(&calibration.values.poses);
+    let points = pairs.flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
     lattice(match extent {
         Extent::Box([x0, y0, z0, x1, y1, z1]) => [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)],
         _ => bounds(points),

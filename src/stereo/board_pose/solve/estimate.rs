@@ -117,7 +117,7 @@ pub fn estimate<'a>(
         let by = 1.0 / (inflation * excess).sqrt();
         bundle.views.iter_mut().flat_map(|view| &mut view.observations).for_each(|o| o.whitener *= by);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
-        covariance = normal.covariance()?;
+        covariance = invert(&(&normal.told.matrix + &normal.weights))?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
         if known_excess.is_none() {
             excess = (excess * usual_excess(&at_each(&normal, &covariance)))

@@ -223,11 +223,6 @@ impl PoseBlock {
         }
     }
 
-    /// What the corners say of their crossings' places in the plane: the trace of the normal matrix there.
-    pub fn told_in_plane(&self) -> f64 {
-        self.shared.crossings.iter().map(|c| c.own[(0, 0)] + c.own[(1, 1)]).sum()
-    }
-
     /// With the pose eliminated, in the coordinates of the shared unknowns: `basis` maps the first of them to the rig's numbers, the
     /// crossings' deviations follow. `None` where the corners do not determine the pose.
     pub fn eliminate(&self, basis: &DMatrix<f64>) -> Option<Eliminated> {

@@ -65,15 +65,11 @@ pub(super) fn pair_scatter(case: &Case) -> Evidence {
 }
 
 /// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
-fn contradicting<'a>(case: &'a Case) -> Vec<&'a str> {
-    let all = case.calibration.discarded.pairs.iter();
-    all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect()
-}
-
 pub(super) fn pairs_discarded(case: &Case) -> Evidence {
     /// Up to a third single pairs are wrong; beyond it what was kept may be the wrong choice.
     const LIMIT_PERCENT: f64 = 34.0;
-    let contradicting = contradicting(case);
+    let all = case.calibration.discarded.pairs.iter();
+    let contradicting: Vec<&str> = all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect();
     let judged = case.calibration.views.len() + contradicting.len();
     let value = 100.0 * contradicting.len() as f64 / judged.max(1) as f64;
     let named: Vec<&str> = contradicting.iter().take(5).copied().collect();
@@ -146,11 +142,11 @@ pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
     /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses that see wider than this
     /// are calibrated with others.
     const WIDEST_DEG: f64 = 150.0;
-    let Calibration { uncertainty, layout, .. } = case.calibration;
+    let Calibration { covariance, layout, .. } = case.calibration;
     let rig = case.calibration.rig();
     let remedy = "add pairs tilted by 20 to 45 degrees about both axes, at several distances";
     let undecided = |figures, unit, detail| Evidence::of_doubt("focal lengths", remedy, figures, unit, false, detail);
-    let worst = worst_focal_sigma(&uncertainty.shared, layout, rig);
+    let worst = worst_focal_sigma(covariance, layout, rig);
     if worst > WORST_FOCAL_SIGMA {
         let detail = "standard deviation of the focal length that the pictures tell least: boards that all lie alike do not tell it from \
                       their distance";

@@ -130,14 +130,9 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
     }
     check_baseline(calibration)?;
     let folds = folds(calibration).ok_or_else(undetermined)?;
-    let mut measured: Vec<Measured> = calibration
-        .views
-        .par_iter()
-        .enumerate()
-        .map(|(i, view)| {
-            folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view))
-        })
-        .collect();
+    let measured =
+        |(i, view)| folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view));
+    let mut measured: Vec<Measured> = calibration.views.par_iter().enumerate().map(measured).collect();
     let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
     let usual_px = calibration.noise.typical_px(&calibration.views);
     let doubtful = doubtful_corners::leave_out(&mut measured, &names, usual_px);
@@ -149,21 +144,21 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
 fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     /// Standard deviations by which the distance must be more than nothing.
     const FEWEST: f64 = 3.0;
-    let Calibration { layout, uncertainty, .. } = calibration;
+    let Calibration { layout, covariance, .. } = calibration;
     let between_mm = calibration.rig().right_from_left.translation.vector;
     let at = layout.transform_start() + 3;
     let direction = between_mm.try_normalize(0.0).unwrap_or_else(Vector3::x);
     let sigma_mm = |covariance: &DMatrix<f64>, at: usize| {
         (direction.transpose() * covariance.fixed_view::<3, 3>(at, at) * direction).x.max(0.0).sqrt()
     };
-    let (baseline_mm, sigma_of_both_mm) = (between_mm.norm(), sigma_mm(&uncertainty.shared, at));
+    let (baseline_mm, sigma_of_both_mm) = (between_mm.norm(), sigma_mm(covariance, at));
     if baseline_mm >= FEWEST * sigma_of_both_mm {
         return Ok(());
     }
     let (first, rest) = (layout.transform_start(), layout.count() - layout.transform_start());
-    let lenses_known = uncertainty::invert(&uncertainty.shared)
+    let lenses_known = uncertainty::invert(covariance)
         .and_then(|told| uncertainty::invert(&told.view((first, first), (rest, rest)).into_owned()));
-    let focal_sigma = uncertainty::worst_focal_sigma(&uncertainty.shared, layout, calibration.rig());
+    let focal_sigma = uncertainty::worst_focal_sigma(covariance, layout, calibration.rig());
     if focal_sigma > WORST_FOCAL_SIGMA
         && lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3))
     {
@@ -184,8 +179,8 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
         without = within(UNTOLD_FOCAL_SIGMA);
     }
     let inflation = calibration.inflation;
-    let by_noise = uncertainty::of_equations(&equations)?.shared * inflation;
-    let more = &calibration.uncertainty.shared - by_noise;
+    let by_noise = uncertainty::covariance(&equations)? * inflation;
+    let more = &calibration.covariance - by_noise;
     let covariance = |w: &Without| {
         let matrix = &w.covariance * inflation + &more;
         RigCovariance::new(&Covariance { order: layout.names(), matrix })

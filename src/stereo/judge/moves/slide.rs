@@ -68,7 +68,7 @@ impl<'a> Places<'a> {
         let turn = rotation.scaled_axis();
         let [a, b] = ends.map(|i| &self.places[i]);
         let through = &b.through - &a.through;
-        let by_rig = &through * &self.calibration.uncertainty.shared * through.transpose() * self.widened.powi(2);
+        let by_rig = &through * &self.calibration.covariance * through.transpose() * self.widened.powi(2);
         let covariance = a.own + b.own + Matrix6::from_fn(|i, j| by_rig[(i, j)]);
         let part = |at| covariance.fixed_view::<3, 3>(at, at).into_owned();
         let [of_turn, of_shift]: [SMatrix<f64, 3, 3>; 2] = [part(0), part(3)];
