@@ -39,7 +39,6 @@ pub enum Error {
         found: usize,
         /// Fewest pairs for a calibration.
         needed: usize,
-        /// Pairs there were.
         total: usize,
         /// The others.
         skipped: Vec<Skipped>,
@@ -73,7 +72,6 @@ pub enum Error {
         corners: usize,
         unknowns: usize,
     },
-    /// One camera's pictures fit no camera.
     #[error("the corners in the {} pictures fit no camera", side.name())]
     NoCamera { side: Side },
     /// Most pairs do not belong to one rig.
@@ -139,7 +137,6 @@ pub enum Error {
         /// Those, or the nearest: the pairs as `--known-move` takes them, and how the board moved.
         candidates: Vec<(String, String)>,
     },
-    /// One move that is stated twice.
     #[error("the move between pairs {} and {} is stated twice", pairs[0], pairs[1])]
     MoveTwice { pairs: [String; 2] },
     /// The views do not tell the cameras.
@@ -155,7 +152,6 @@ pub enum Error {
         "the pairs do not determine a {lens} lens: several of its numbers can be exchanged for each other without moving any corner"
     )]
     LensUndetermined { lens: &'static str },
-    /// The search did not end at a minimum.
     #[error("the calibration did not converge within {steps} steps")]
     NotConverged { steps: usize },
     #[error("the target was measured at none of {poses} poses")]
@@ -168,14 +164,12 @@ pub enum Error {
     RigChanged {
         /// What changed, and by how much.
         statement: String,
-        /// What to do.
         hint: &'static str,
     },
     /// A lens that another program has no words for.
     #[error("{format}'s format has no {lens} lens; its richest is {most}")]
     LensNotExportable {
         format: &'static str,
-        /// The lens of the rig.
         lens: &'static str,
         /// The richest lens of the format.
         most: &'static str,

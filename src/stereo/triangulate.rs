@@ -20,7 +20,6 @@ pub const RIG_NUMBERS: usize = 2 * CAMERA_NUMBERS + 6;
 /// Steps of Gauss-Newton; the start is within a pixel, so that three reach rounding.
 const STEPS: usize = 5;
 
-/// A triangulated point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpacePoint {
     /// The point in the left camera's frame, mm.

@@ -38,9 +38,7 @@ const UNUSUAL_MISFIT: f64 = 3.0;
 /// The pictures of one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// Where the robot was.
     pub at: RobotPose,
-    /// Its corners, or why there are none.
     pub corners: Result<PairCorners, Refusal>,
 }
 
@@ -74,7 +72,6 @@ impl Knowledge {
 /// Of two poses with the same picture, the one whose pictures miss the rig by more than this many times what is usual has the other's.
 const TWIN_MISFIT: f64 = 10.0;
 
-/// A run while it is worked on.
 pub(super) struct Run<'a> {
     pub(super) known: &'a Knowledge,
     pub(super) at: Vec<RobotPose>,

@@ -10,7 +10,6 @@ use crate::statistics::median;
 use crate::stereo::data::{Observation, View, in_use};
 use crate::stereo::solve::Loss;
 
-/// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Factor on the refinement's covariances, at most 1.

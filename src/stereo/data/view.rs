@@ -12,9 +12,7 @@ const COARSE_PX: f64 = 1.0;
 /// What one pair of pictures shows of the board: left corners first, then right.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// Name of the pair.
     pub pair: String,
-    /// Its corners.
     pub observations: Vec<Observation>,
 }
 
@@ -37,12 +35,10 @@ impl View {
         View { pair: corners.pair.clone(), observations }
     }
 
-    /// Active corners of one picture.
     pub fn active(&self, side: Side) -> impl Iterator<Item = &Observation> + Clone {
         self.observations.iter().filter(move |o| o.active && o.side == side)
     }
 
-    /// Only the corners of one picture.
     pub fn only(&self, side: Side) -> View {
         let observations = self.observations.iter().copied().filter(|o| o.side == side).collect();
         View { pair: self.pair.clone(), observations }

@@ -62,13 +62,11 @@ pub enum Kind {
 pub struct Finding {
     /// The cause, or the causes that these pairs do not tell apart, with `|` between them.
     pub cause: String,
-    /// Over which pairs.
     pub kind: Kind,
     /// The pairs: those from the step on, all that drift, or those that something happened to.
     pub pairs: Vec<String>,
     /// By how much, from before the step to after it or from the first pair to the last.
     pub size: Option<f64>,
-    /// Unit of the size.
     pub unit: &'static str,
     /// By how much it moves a length in the volume, mm.
     pub effect_mm: Option<f64>,
@@ -163,7 +161,6 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     found
 }
 
-/// A pattern over the series.
 struct Pattern {
     kind: Kind,
     first: usize,

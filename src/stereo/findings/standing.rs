@@ -27,11 +27,9 @@ const MIDDLE: f64 = 0.5;
 /// What is asked of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Asked {
-    /// Lens and board.
     pub options: Options,
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
-    /// The volume.
     pub extent: Extent,
 }
 

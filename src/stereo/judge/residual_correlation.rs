@@ -26,7 +26,6 @@ const HARMLESS: f64 = 0.05;
 pub struct Cell {
     /// Middle of the cell, px.
     pub x_px: f64,
-    /// Middle of the cell, px.
     pub y_px: f64,
     pub corners: usize,
     /// Mean residual (predicted minus seen), px; zero where there are none.
@@ -36,7 +35,6 @@ pub struct Cell {
 /// The residuals of one picture, cell by cell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Field {
-    /// Which picture.
     pub side: &'static str,
     /// Row by row.
     pub cells: Vec<Cell>,
@@ -70,7 +68,6 @@ impl ResidualPattern {
     }
 }
 
-/// Looks for patterns.
 pub fn check(calibration: &Calibration) -> ResidualPattern {
     let shared = &calibration.values.shared;
     let mut fields = Side::BOTH.map(|side| Gather::new(side, shared.rig.camera(side)));

@@ -140,7 +140,6 @@ impl Camera {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
 
-    /// As OpenCV takes it.
     pub fn for_opencv(&self) -> crate::opencv::Lens<'_> {
         let distortion = &self.distortion[..self.lens.vector_length()];
         crate::opencv::Lens { matrix: self.matrix(), distortion, size: (self.width, self.height) }

@@ -106,9 +106,7 @@ pub fn fundamental(rig: &Rig) -> Option<Matrix3<f64>> {
 pub struct RowResidual {
     /// Points seen in both pictures.
     pub corners: usize,
-    /// RMS of the differences, px.
     pub rms_px: f64,
-    /// The largest, px.
     pub max_px: f64,
 }
 

@@ -40,7 +40,6 @@ const LARGEST_SHARE: f64 = 2e-3;
 pub struct Series {
     /// Its pairs, with right corners turned where that was needed, and a first rig with each pair's pose on it.
     pub problem: Problem,
-    /// The other pairs.
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,

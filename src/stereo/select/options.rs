@@ -29,7 +29,6 @@ pub struct KnownScatter {
     pub pairs: f64,
 }
 
-/// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// What is free.

@@ -72,13 +72,10 @@ pub enum Stop {
 /// The end of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// The values reached.
     pub values: Values,
     /// Half the (robust) sum of squares there.
     pub cost: f64,
-    /// Why it stopped.
     pub stop: Stop,
-    /// Steps tried.
     pub steps: usize,
 }
 

@@ -63,7 +63,6 @@ enum Number {
     Shape(usize),
 }
 
-/// All expectations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
     all: Vec<Expectation>,

@@ -20,9 +20,7 @@ const MOST_ROUNDS: usize = 12;
 /// Views that agree, with values to start from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// The pairs.
     pub views: Vec<View>,
-    /// Values of all unknowns.
     pub values: Values,
     /// What is expected of cameras and board before any picture.
     pub priors: Priors,
@@ -33,7 +31,6 @@ pub struct Problem {
 pub struct Solved {
     /// Views with whitened corners, and the values reached.
     pub problem: Problem,
-    /// How corners scatter.
     pub noise: Noise,
     /// Gaussian, or with heavy tails; the whiteners hold the weights that it gives.
     pub loss: Loss,
@@ -194,7 +191,6 @@ impl Solved {
         earlier.map_or(1.0, |earlier| (px(earlier) / px(&self.noise)).powi(2).max(1.0))
     }
 
-    /// The shared values.
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared
     }

@@ -96,13 +96,11 @@ impl VolumeLength {
     }
 }
 
-/// Lengths through the volume.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VolumeLengths {
     pub volume: Volume,
     /// What it was asked for as.
     pub extent: Extent,
-    /// How long they are, mm.
     pub length_mm: f64,
     /// Those whose ends lie in the volume, as the boards lay in it.
     pub lengths: Vec<VolumeLength>,

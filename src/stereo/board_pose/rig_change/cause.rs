@@ -37,7 +37,6 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All that are tried.
     pub const ALL: [Cause; 10] = [
         Cause::Turn(0),
         Cause::Turn(1),
@@ -111,11 +110,9 @@ impl Cause {
 /// How a cause would explain what is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Explanation {
-    /// What.
     pub cause: Cause,
     /// By how much: rad, mm, or a share.
     pub amount: f64,
-    /// Standard deviation of that.
     pub sigma: f64,
     /// By how much chi-square falls with it.
     pub fall: f64,
@@ -124,7 +121,6 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// In words.
     pub fn describe(&self, rig: &Rig, board: &Board) -> String {
         let words = self.cause.describe(self.amount, rig, board);
         if self.grows { format!("{words}, little by little from the first pose to the last") } else { words }

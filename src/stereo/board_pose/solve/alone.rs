@@ -33,7 +33,6 @@ pub struct Alone {
     pub part: Eliminated,
     /// Chi-square of the active corners over its degrees of freedom.
     pub chi_square: f64,
-    /// Degrees of freedom.
     pub freedom: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
@@ -42,7 +41,6 @@ pub struct Alone {
 }
 
 impl<'a> Known<'a> {
-    /// The values of an estimate.
     pub fn new(found: &'a Estimate<'_>) -> Known<'a> {
         Known { scene: found.bundle.scene(&found.values), found }
     }

@@ -47,7 +47,6 @@ pub struct Values {
 pub struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
-    /// Every pose's corners.
     pub views: Vec<View>,
     /// The calibration.
     pub rig: RigPrior,

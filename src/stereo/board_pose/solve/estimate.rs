@@ -54,7 +54,6 @@ pub struct Estimate<'a> {
     pub normal: Normal,
     /// Covariance of the shared unknowns.
     pub covariance: DMatrix<f64>,
-    /// How corners scatter.
     pub noise: Noise,
     /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a variance.
     pub excess: f64,

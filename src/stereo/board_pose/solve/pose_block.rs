@@ -41,7 +41,6 @@ impl<'a> Scene<'a> {
         Scene { rig, board, crossings }
     }
 
-    /// The crossing of a corner.
     pub fn crossing(&self, o: &Observation) -> Point3<f64> {
         self.crossings[self.board.index(o.col, o.row)]
     }

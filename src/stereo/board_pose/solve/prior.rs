@@ -68,7 +68,6 @@ impl RigPrior {
         prior
     }
 
-    /// The rig at these unknowns.
     pub fn rig_at(&self, unknowns: &DVector<f64>) -> Rig {
         let calibrated = Shared { rig: self.rig.clone(), shape_mm: FLAT };
         Layout::WHOLE_RIG.step(&calibrated, (&self.basis * unknowns).as_slice()).rig

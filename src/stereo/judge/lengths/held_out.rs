@@ -27,7 +27,6 @@ const SHORT_SQUARES: usize = 1;
 /// One pair as measured by cameras that have not seen it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOutPair {
-    /// Its name.
     pub pair: String,
     /// Mean error of the short range along x, mm; `None` where no such length was seen.
     #[serde(rename = "mean_error_x10_mm")]
@@ -50,19 +49,15 @@ pub struct HeldOutPair {
     pub long_errors_mm: Vec<f64>,
 }
 
-/// The accuracy of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accuracy {
-    /// The length errors that decide.
     pub extremes: Extremes,
     /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures disagree as
     /// much as the corners scatter, less where both see the same deviations from the board.
     pub rays_chi_square: f64,
     /// Distance of corners from the epipolar lines of their partners.
     pub epipolar: EpipolarError,
-    /// Corners that say less than the others.
     pub doubtful: DoubtfulCorners,
-    /// Number of folds.
     pub folds: usize,
     /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually are
     /// helped to.
@@ -75,7 +70,6 @@ pub struct Accuracy {
     pub long_mm: [f64; 2],
     /// Every range, x first, from the shortest.
     pub ranges: Vec<Range>,
-    /// Every pair.
     pub pairs: Vec<HeldOutPair>,
 }
 
@@ -90,9 +84,7 @@ impl Accuracy {
 /// Distance of corners from the epipolar lines of their partners.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EpipolarError {
-    /// Root mean square, px.
     pub rms_px: f64,
-    /// Largest, px.
     pub max_px: f64,
 }
 

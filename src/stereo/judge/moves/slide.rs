@@ -31,7 +31,6 @@ pub(super) struct Slide {
     pub length_mm: f64,
     /// Standard deviation of that through the corners of both pairs and the rig, mm.
     pub sigma_mm: f64,
-    /// How far it turned, rad.
     pub turn_rad: f64,
     /// Whether that is more than chance.
     pub is_turned: bool,
@@ -54,7 +53,6 @@ impl<'a> Places<'a> {
         Some(Places { calibration, places, widened })
     }
 
-    /// The pairs' names.
     pub fn names(&self, ends: [usize; 2]) -> [String; 2] {
         ends.map(|i| self.calibration.views[i].pair.clone())
     }
