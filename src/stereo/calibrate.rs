@@ -18,7 +18,7 @@ use crate::stereo::select::lens_ladder;
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
-use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
+use crate::stereo::select::stated_uncertainty::{self, Witness};
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens, Rig};
 
@@ -160,7 +160,7 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
     let without_scatter = by_noise.clone();
     let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
-    let Stated { mut covariance, pair_scatter, witnesses } =
+    let (mut covariance, pair_scatter, witnesses) =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;

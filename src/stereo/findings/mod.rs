@@ -113,11 +113,6 @@ impl Along {
         &self.whole * share - &self.common
     }
 
-    /// From the rig that is taken to the one at the last pair.
-    pub fn to_last(&self) -> DVector<f64> {
-        self.to(1.0)
-    }
-
     /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step; `noise` is the variance of
     /// the corners without the change over the one that they were weighed by, at which the pairs scatter at least.
     pub fn sigma_of(&self, share: f64, noise: f64) -> DVector<f64> {

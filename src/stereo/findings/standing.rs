@@ -258,13 +258,13 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
                 None => found.move_rig(&along.to(MIDDLE)),
             }
         }
-        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE, noise) } else { along.to_last() }];
+        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE, noise) } else { along.to(1.0) }];
         if change.kind == Kind::Drift {
             *along = along.seen_from(MIDDLE);
-            found.since_moment.push(along.to_last());
+            found.since_moment.push(along.to(1.0));
             // Of a board that grows nobody knows at which pair it had its size.
             if board_may_grow {
-                within.push(along.to_last());
+                within.push(along.to(1.0));
             }
         }
         allow_for(found, &within);

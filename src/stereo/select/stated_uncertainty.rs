@@ -37,17 +37,9 @@ pub struct Witness {
     step: DVector<f64>,
 }
 
-/// What is stated of a solution.
-pub struct Stated {
-    /// Covariance of the shared numbers.
-    pub covariance: DMatrix<f64>,
-    pub pair_scatter: PairScatter,
-    /// Richer models that are witnesses of another rig.
-    pub witnesses: Vec<Witness>,
-}
-
 /// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers scatter by where lenses are
-/// `known` at least. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// `known` at least; with how the pairs scatter, and the richer models that are witnesses of another rig. `print_excess`: see
+/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
@@ -56,11 +48,11 @@ pub fn state(
     scores: &[LensScore],
     known: Option<KnownScatter>,
     print_excess: f64,
-) -> Stated {
+) -> (DMatrix<f64>, PairScatter, Vec<Witness>) {
     let [lenses, pairs] = known.map_or([1.0; 2], |known| [known.lenses, known.pairs].map(|v| (v / inflation).max(1.0)));
     let Some((mut covariance, pair_scatter)) = scattered(solved, layout, &by_noise, inflation, [lenses, pairs]) else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
-        return Stated { covariance: by_noise * lenses, pair_scatter, witnesses: Vec::new() };
+        return (by_noise * lenses, pair_scatter, Vec::new());
     };
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(lenses);
     let richer = richer(layout, scores, known.is_some());
@@ -72,7 +64,7 @@ pub fn state(
     for witness in likeliest.into_iter().chain(witnesses.iter().filter(|w| w.layout.left == layout.left)) {
         covariance += &witness.step * witness.step.transpose();
     }
-    Stated { covariance, pair_scatter, witnesses }
+    (covariance, pair_scatter, witnesses)
 }
 
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the

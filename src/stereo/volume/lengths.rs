@@ -232,17 +232,13 @@ fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
 
 /// Places through a box, from its lowest to its highest corner.
 fn lattice([low, high]: [Vector3<f64>; 2]) -> Vec<Point3<f64>> {
+    let [nx, ny, nz] = PLACES;
     let share = |i: usize, of: usize| i as f64 / (of - 1) as f64;
-    let mut places = Vec::new();
-    for iz in 0..PLACES[2] {
-        for iy in 0..PLACES[1] {
-            for ix in 0..PLACES[0] {
-                let shares = Vector3::new(share(ix, PLACES[0]), share(iy, PLACES[1]), share(iz, PLACES[2]));
-                places.push(Point3::from(low + (high - low).component_mul(&shares)));
-            }
-        }
-    }
-    places
+    let place = |k: usize| {
+        let shares = Vector3::new(share(k % nx, nx), share(k / nx % ny, ny), share(k / (nx * ny), nz));
+        Point3::from(low + (high - low).component_mul(&shares))
+    };
+    (0..nx * ny * nz).map(place).collect()
 }
 
 fn length(

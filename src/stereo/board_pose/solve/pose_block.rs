@@ -77,6 +77,7 @@ pub struct PoseBlock {
 }
 
 /// The part of the pose alone.
+#[derive(Default)]
 pub struct PoseSums {
     matrix: Matrix6<f64>,
     gradient: Vector6<f64>,
@@ -135,13 +136,9 @@ struct Row {
 }
 
 impl PoseSums {
-    fn zeros() -> PoseSums {
-        PoseSums { matrix: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 }
-    }
-
     /// The sums at these values, without those of a [`PoseBlock`]. `None` where a corner would lie behind its camera.
     pub fn of(scene: &Scene<'_>, left_from_board: &Transform, view: &View, loss: Loss) -> Option<PoseSums> {
-        let mut sums = PoseSums::zeros();
+        let mut sums = PoseSums::default();
         scene.each_corner(left_from_board, view, |_, _, rows| {
             let weight = sums.weigh(rows, loss);
             rows.iter().for_each(|row| sums.add(row, weight));
@@ -179,7 +176,7 @@ impl PoseBlock {
             shared: CornerSums::zeros(scene.crossings.len()),
             rig_pose: SMatrix::zeros(),
             crossings_pose: vec![Matrix3x6::zeros(); scene.crossings.len()],
-            pose: PoseSums::zeros(),
+            pose: PoseSums::default(),
         };
         scene.each_corner(left_from_board, view, |side, at, rows| {
             let weight = block.pose.weigh(rows, loss);
