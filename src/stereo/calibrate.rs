@@ -3,7 +3,7 @@
 //! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
 //! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::print_share;
@@ -18,8 +18,8 @@ use crate::stereo::select::lens_ladder;
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
-use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
-use crate::stereo::solve::{Priors, Problem, Solved, Uncertainty};
+use crate::stereo::select::stated_uncertainty::{self, Witness};
+use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
@@ -33,8 +33,8 @@ pub struct Calibration {
     pub views: Vec<View>,
     /// Rig, shape, a pose a pair; the rig carries its covariance.
     pub values: Values,
-    /// Covariance of the shared numbers and of each pose.
-    pub uncertainty: Uncertainty,
+    /// Covariance of the shared numbers, in the layout's order.
+    pub covariance: DMatrix<f64>,
     /// How corners scatter.
     pub noise: Noise,
     /// The same without the board's print: what pictures of another board scatter by.
@@ -137,21 +137,12 @@ impl Calibration {
 
 /// Calibrates both cameras and the rig from the pairs that belong together.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    calibrate_with(corners, options, false)
+    calibrate_by(corners, options, false, false)
 }
 
 /// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
-/// can be found over the series.
-pub fn calibrate_with(corners: &Corners, options: &Options, runs: bool) -> Result<Calibration, Error> {
-    calibrate_by(corners, options, runs, false)
-}
-
-/// The same with the lenses that the pairs tell, whatever each camera alone tells of them; runs stay in.
-pub fn calibrate_by_pairs(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    calibrate_by(corners, options, true, true)
-}
-
-fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
+/// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them.
+pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
@@ -165,19 +156,19 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
     let neighbours = solved.problem.neighbours();
     let inflation = solved.inflation();
-    let by_noise = by_corners.scaled(inflation);
-    let without_scatter = by_noise.shared.clone();
+    let by_noise = by_corners * inflation;
+    let without_scatter = by_noise.clone();
     let print = print_share(&solved, &corners.board, &layout);
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
-    let Stated { mut uncertainty, pair_scatter, witnesses } =
+    let (mut covariance, pair_scatter, witnesses) =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {
-        uncertainty.shared += print.covariance - without_scatter;
+        covariance += print.covariance - without_scatter;
         own_noise = print.own_noise;
     }
-    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: uncertainty.shared.clone() });
+    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: covariance.clone() });
     Ok(Calibration {
         board: corners.board,
         layout,
@@ -201,7 +192,7 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
         lens_scores,
         views,
         values,
-        uncertainty,
+        covariance,
     })
 }
 
@@ -210,17 +201,14 @@ fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool
 fn solved_by(
     start: &Problem,
     choose: impl Fn(Option<Lens>) -> Result<Choice, Error>,
-) -> Result<(Choice, Solved, Uncertainty), Error> {
+) -> Result<(Choice, Solved, DMatrix<f64>), Error> {
     let mut below = None;
     loop {
         let choice = choose(below)?;
-        let Choice { layout, near, priors, .. } = &choice;
-        let values = near.clone().unwrap_or_else(|| start.values.clone());
-        let solved = Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout);
-        match solved.and_then(|solved| Ok((solved.uncertainty(layout)?, solved))) {
-            Ok((uncertainty, solved)) => return Ok((choice, solved, uncertainty)),
+        match choice.solve(start).and_then(|solved| Ok((solved.covariance(&choice.layout)?, solved))) {
+            Ok((covariance, solved)) => return Ok((choice, solved, covariance)),
             Err(error) if choice.simpler().is_none() => return Err(error),
-            Err(_) => below = layout.left,
+            Err(_) => below = choice.layout.left,
         }
     }
 }

@@ -39,7 +39,6 @@ pub enum Error {
         found: usize,
         /// Fewest pairs for a calibration.
         needed: usize,
-        /// Pairs there were.
         total: usize,
         /// The others.
         skipped: Vec<Skipped>,
@@ -66,20 +65,13 @@ pub enum Error {
         "the cameras cannot be told from one camera: their distance is {baseline_mm:.2} mm with a standard deviation of {sigma_mm:.2} mm; \
          nothing is measured by rays that hardly cross"
     )]
-    NoBaseline {
-        /// Distance of the cameras' centres, mm.
-        baseline_mm: f64,
-        /// Its standard deviation, mm.
-        sigma_mm: f64,
-    },
-    /// Too few corners for so many unknowns.
+    NoBaseline { baseline_mm: f64, sigma_mm: f64 },
     #[error("{corners} corners give {} numbers for {unknowns} unknowns", 2 * .corners)]
     TooFewCorners {
         /// Corners that are no outliers.
         corners: usize,
         unknowns: usize,
     },
-    /// One camera's pictures fit no camera.
     #[error("the corners in the {} pictures fit no camera", side.name())]
     NoCamera { side: Side },
     /// Most pairs do not belong to one rig.
@@ -130,12 +122,7 @@ pub enum Error {
     },
     /// A pair that was asked for and is not there.
     #[error("there is no pair {pair} with a board in both pictures; there are {}", named(.pairs))]
-    NoSuchPair {
-        /// Its name.
-        pair: String,
-        /// Names of those that there are.
-        pairs: Vec<String>,
-    },
+    NoSuchPair { pair: String, pairs: Vec<String> },
     /// A known move whose pairs were not named, and that no or several pairs could be.
     #[error(
         "between which pairs the board moved by {length_mm} mm is not settled: {}{}",
@@ -150,7 +137,6 @@ pub enum Error {
         /// Those, or the nearest: the pairs as `--known-move` takes them, and how the board moved.
         candidates: Vec<(String, String)>,
     },
-    /// One move that is stated twice.
     #[error("the move between pairs {} and {} is stated twice", pairs[0], pairs[1])]
     MoveTwice { pairs: [String; 2] },
     /// The views do not tell the cameras.
@@ -166,18 +152,10 @@ pub enum Error {
         "the pairs do not determine a {lens} lens: several of its numbers can be exchanged for each other without moving any corner"
     )]
     LensUndetermined { lens: &'static str },
-    /// The search did not end at a minimum.
     #[error("the calibration did not converge within {steps} steps")]
-    NotConverged {
-        /// Steps tried.
-        steps: usize,
-    },
-    /// Not one pose of a robot was measured.
+    NotConverged { steps: usize },
     #[error("the target was measured at none of {poses} poses")]
-    NothingMeasured {
-        /// Poses in the list.
-        poses: usize,
-    },
+    NothingMeasured { poses: usize },
     /// A calibration without a covariance, which says nothing of how far its rig is known.
     #[error("the calibration has no covariance of its rig: a change is not told from what was not known before")]
     NoCovariance,
@@ -186,38 +164,24 @@ pub enum Error {
     RigChanged {
         /// What changed, and by how much.
         statement: String,
-        /// What to do.
         hint: &'static str,
     },
     /// A lens that another program has no words for.
     #[error("{format}'s format has no {lens} lens; its richest is {most}")]
     LensNotExportable {
         format: &'static str,
-        /// The lens of the rig.
         lens: &'static str,
         /// The richest lens of the format.
         most: &'static str,
     },
     /// Cameras whose pictures cannot be brought onto common rows.
     #[error("the cameras' pictures have no common rows: {reason}")]
-    NoCommonRows {
-        /// Why.
-        reason: String,
-    },
-    /// OpenCV refused what it was asked.
+    NoCommonRows { reason: String },
     #[error(transparent)]
     OpenCv(#[from] crate::opencv::Failure),
     /// Pictures of another size than the calibration's.
     #[error("the {} pictures are {found_width}x{found_height} px, the calibration is for {width}x{height}", side.name())]
-    PictureSize {
-        side: Side,
-        found_width: u32,
-        found_height: u32,
-        /// Needed.
-        width: u32,
-        /// Needed.
-        height: u32,
-    },
+    PictureSize { side: Side, found_width: u32, found_height: u32, width: u32, height: u32 },
 }
 
 fn moved(list: &[(String, String)]) -> String {

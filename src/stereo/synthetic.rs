@@ -154,35 +154,25 @@ impl World {
     /// The same where the next pair's rig is asked for pair by pair.
     fn corners_by(&self, seed: u64, mut rig: impl FnMut() -> Rig) -> Corners {
         let mut draws = Draws::new(seed, Purpose::Points, 0);
-        let pairs = self
-            .poses
-            .iter()
-            .enumerate()
-            .map(|(i, pose)| {
-                let mut pair = PairCorners { pair: format!("{i:02}"), ..PairCorners::default() };
-                let rig = rig();
-                for row in 0..self.board.rows() {
-                    for col in 0..self.board.columns() {
-                        let (left, right) = rig.project(&(pose * self.corner_mm(col, row)));
-                        for (list, px, camera) in
-                            [(&mut pair.left, left, &rig.left), (&mut pair.right, right, &rig.right)]
-                        {
-                            let px: Point2<f64> = px + Vector2::new(draws.normal(), draws.normal()) * self.sigma_px;
-                            if px.x > 0.0
-                                && px.y > 0.0
-                                && px.x < f64::from(camera.width)
-                                && px.y < f64::from(camera.height)
-                            {
-                                let reach = (self.reach > 0.0).then_some([self.reach; 2]);
-                                let covariance_px2 = Some(Matrix2::identity() * self.sigma_px * self.sigma_px);
-                                list.push(Corner { col, row, px, covariance_px2, blur_px: None, reach, used: true });
-                            }
-                        }
+        let reach = (self.reach > 0.0).then_some([self.reach; 2]);
+        let covariance_px2 = Some(Matrix2::identity() * self.sigma_px * self.sigma_px);
+        let mut pairs = Vec::new();
+        for (i, pose) in self.poses.iter().enumerate() {
+            let mut pair = PairCorners { pair: format!("{i:02}"), ..PairCorners::default() };
+            let rig = rig();
+            for at in 0..self.board.corner_count() {
+                let (col, row) = self.board.place(at);
+                let (left, right) = rig.project(&(pose * self.corner_mm(col, row)));
+                for (list, px, camera) in [(&mut pair.left, left, &rig.left), (&mut pair.right, right, &rig.right)] {
+                    let px: Point2<f64> = px + Vector2::new(draws.normal(), draws.normal()) * self.sigma_px;
+                    let [width, height] = [camera.width, camera.height].map(f64::from);
+                    if px.x > 0.0 && px.y > 0.0 && px.x < width && px.y < height {
+                        list.push(Corner { col, row, px, covariance_px2, blur_px: None, reach, used: true });
                     }
                 }
-                pair
-            })
-            .collect();
+            }
+            pairs.push(pair);
+        }
         Corners {
             board: self.board,
             left_size: (self.rig.left.width, self.rig.left.height),

@@ -20,7 +20,6 @@ pub const RIG_NUMBERS: usize = 2 * CAMERA_NUMBERS + 6;
 /// Steps of Gauss-Newton; the start is within a pixel, so that three reach rounding.
 const STEPS: usize = 5;
 
-/// A triangulated point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpacePoint {
     /// The point in the left camera's frame, mm.
@@ -147,9 +146,11 @@ impl RigCovariance {
         RigCovariance { numbers, covariance: covariance.clone() }
     }
 
-    /// Variance of a quantity with these derivatives by the rig's numbers.
-    pub fn variance(&self, by_rig: impl Fn(usize) -> f64) -> f64 {
-        let slopes: Vec<(usize, f64)> = self.numbers.iter().map(|&(at, number)| (at, by_rig(number))).collect();
+    /// Variance of the length between two points through the calibration, mm^2: its share is common to both.
+    pub fn length_variance_mm2(&self, a: &SpacePoint, b: &SpacePoint) -> f64 {
+        let direction = (b.point_mm - a.point_mm).normalize();
+        let slope = |number: usize| direction.dot(&(b.by_rig[number] - a.by_rig[number]));
+        let slopes: Vec<(usize, f64)> = self.numbers.iter().map(|&(at, number)| (at, slope(number))).collect();
         let mut sum = 0.0;
         for &(i, a) in &slopes {
             for &(j, b) in &slopes {
@@ -157,12 +158,6 @@ impl RigCovariance {
             }
         }
         sum
-    }
-
-    /// Variance of the length between two points through the calibration, mm^2: its share is common to both.
-    pub fn length_variance_mm2(&self, a: &SpacePoint, b: &SpacePoint) -> f64 {
-        let direction = (b.point_mm - a.point_mm).normalize();
-        self.variance(|number| direction.dot(&(b.by_rig[number] - a.by_rig[number])))
     }
 }
 

@@ -286,7 +286,7 @@ fn in_space(calibration: &Calibration, judged: &Judged) -> Markup {
 fn parameters(calibration: &Calibration) -> Markup {
     let layout = &calibration.layout;
     let values = layout.numbers(&calibration.values.shared);
-    let covariance = &calibration.uncertainty.shared;
+    let covariance = &calibration.covariance;
     let mut rows: Vec<Vec<String>> = layout
         .names()
         .into_iter()

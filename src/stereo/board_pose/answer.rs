@@ -44,12 +44,9 @@ pub struct Refusal {
     pub reason: String,
 }
 
-/// A robot pose and what was measured there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredPose {
-    /// Where the robot was.
     pub at: RobotPose,
-    /// The target's pose, or why there is none.
     pub target: Result<TargetPose, Refusal>,
 }
 
@@ -78,16 +75,13 @@ pub struct Shared {
     pub covariance: DMatrix<f64>,
 }
 
-/// Everything about a run.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Series {
     /// A row a pose, in the order of the run.
     pub poses: Vec<MeasuredPose>,
     /// The target, where any pose was measured.
     pub shape: Option<Shape>,
-    /// What the poses share.
     pub shared: Option<Shared>,
-    /// What is found of the rig.
     pub judgement: Judgement,
     /// How corners scatter here, px.
     pub noise_px: Option<f64>,

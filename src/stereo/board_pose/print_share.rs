@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
 use crate::geometry::Transform;
 use crate::imaging::Board;
-use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
+use crate::stereo::board_pose::solve::pose_block::{CrossingSums, Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::board_pose::solve::window::{SeenShares, Window};
 use crate::stereo::data::{Noise, View, in_use};
@@ -66,7 +66,9 @@ pub fn print_share(solved: &Solved, board: &Board, layout: &Layout) -> Option<Pr
         Window::means(board, views).iter().map(|window| [0, 1].map(|axis| window.shares(axis))).collect();
     // What the corners say of their crossings' places in the plane, summed; and how many numbers they are.
     let mut told = 0.0;
-    let totals = totals_of_pairs(views, values, board, &basis, |block, _| told += block.told_in_plane())?;
+    let in_plane = |c: &CrossingSums| c.own[(0, 0)] + c.own[(1, 1)];
+    let add = |block: PoseBlock, _| told += block.shared.crossings.iter().map(in_plane).sum::<f64>();
+    let totals = totals_of_pairs(views, values, board, &basis, add)?;
     told *= usual_variance(&seen);
     let numbers = 2.0 * in_use(views).count() as f64;
     let variance = print_variance(&totals, &seen, rig_count, told / numbers.max(1.0));

@@ -38,9 +38,7 @@ const UNUSUAL_MISFIT: f64 = 3.0;
 /// The pictures of one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
-    /// Where the robot was.
     pub at: RobotPose,
-    /// Its corners, or why there are none.
     pub corners: Result<PairCorners, Refusal>,
 }
 
@@ -74,7 +72,6 @@ impl Knowledge {
 /// Of two poses with the same picture, the one whose pictures miss the rig by more than this many times what is usual has the other's.
 const TWIN_MISFIT: f64 = 10.0;
 
-/// A run while it is worked on.
 pub(super) struct Run<'a> {
     pub(super) known: &'a Knowledge,
     pub(super) at: Vec<RobotPose>,
@@ -191,12 +188,8 @@ impl<'a> Run<'a> {
         });
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY, grows: false };
         let moves_mm = median(moves).unwrap_or(0.0);
-        Some(Judgement::Contradicts(Changed {
-            explanations: vec![explanation],
-            moves_mm,
-            beyond: f64::INFINITY,
-            scaled_mm: None,
-        }))
+        let explanations = vec![explanation];
+        Some(Judgement::Contradicts(Changed { explanations, moves_mm, beyond: f64::INFINITY, scaled_mm: None }))
     }
 
     /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
@@ -253,14 +246,8 @@ impl<'a> Run<'a> {
             });
             MeasuredPose { at, target: Err(refusal) }
         });
-        Series {
-            poses: poses.collect(),
-            judgement,
-            excess: 1.0,
-            usual_excess: 1.0,
-            notes: self.notes,
-            ..Series::default()
-        }
+        let poses = poses.collect();
+        Series { poses, judgement, excess: 1.0, usual_excess: 1.0, notes: self.notes, ..Series::default() }
     }
 }
 

@@ -38,38 +38,30 @@ pub(super) fn starts(rig: &Rig, board: &Board, pairs: &[PairCorners]) -> Vec<Sta
     let mut views: Vec<View> =
         pairs.par_iter().map(|pair| numbering::seen_on_rig(&shared, board, pair, None)).collect();
     let mut poses: Vec<Option<Transform>> = vec![None; views.len()];
+    let left = |(view, pose): (&View, &Option<Transform>)| -> Vec<(Observation, Vector2<f64>)> {
+        pose.map_or_else(Vec::new, |pose| of_view(&shared, view, &pose))
+    };
     // Twice: the scatter is known only after the first fit.
     for _ in 0..2 {
-        let robust = |(view, known): (&View, &Option<Transform>)| robust(&shared, view, *known);
+        let robust = |(view, known): (&View, &Option<Transform>)| match known {
+            _ if !enough(view) => None,
+            Some(known) => board_pose::refit(&shared, view, *known),
+            None => board_pose::fit(&shared, view),
+        };
         poses = views.par_iter().zip(&poses).map(robust).collect();
-        let left: Vec<(Observation, Vector2<f64>)> = views
-            .iter()
-            .zip(&poses)
-            .filter_map(|(view, pose)| Some((view, (*pose)?)))
-            .flat_map(|(view, pose)| of_view(&shared, view, &pose))
-            .collect();
+        let left: Vec<_> = views.iter().zip(&poses).flat_map(left).collect();
         Noise::from_median(&left).apply(&mut views);
     }
-    let misfit = |view: &View, pose: &Option<Transform>| {
-        let all = pose.map_or_else(Vec::new, |pose| of_view(&shared, view, &pose));
-        median(all.iter().map(|(_, r)| r.norm())).unwrap_or(f64::INFINITY)
+    let start = |(view, pose): (View, Option<Transform>)| {
+        let misfit_px = median(left((&view, &pose)).iter().map(|(_, r)| r.norm())).unwrap_or(f64::INFINITY);
+        Start { view, pose, misfit_px }
     };
-    let misfits: Vec<f64> = views.iter().zip(&poses).map(|(view, pose)| misfit(view, pose)).collect();
-    let together = views.into_iter().zip(poses).zip(misfits);
-    together.map(|((view, pose), misfit_px)| Start { view, pose, misfit_px }).collect()
+    views.into_iter().zip(poses).map(start).collect()
 }
 
 /// True where both pictures show enough corners.
 pub(super) fn enough(view: &View) -> bool {
     Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
-}
-
-fn robust(shared: &Shared, view: &View, known: Option<Transform>) -> Option<Transform> {
-    match known {
-        _ if !enough(view) => None,
-        Some(known) => board_pose::refit(shared, view, known),
-        None => board_pose::fit(shared, view),
-    }
 }
 
 /// Median over the poses of the length of `right_from_left` as each camera alone sees the target, over the calibrated one: what the

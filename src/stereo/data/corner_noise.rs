@@ -10,7 +10,6 @@ use crate::statistics::median;
 use crate::stereo::data::{Observation, View, in_use};
 use crate::stereo::solve::Loss;
 
-/// The noise model of all corners.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Noise {
     /// Factor on the refinement's covariances, at most 1.
@@ -123,28 +122,19 @@ fn shrunk(chi: &[f64], first: f64, reduced: &impl Fn(&mut [f64]) -> f64) -> f64 
     factor
 }
 
-/// A residual along the axes of its corner's own covariance: squares, px^2, and the variances they come with.
-struct Aligned {
-    squares: [f64; 2],
-    variances: [f64; 2],
+/// A residual along the axes of its corner's own covariance: squares, px^2, each with the variance it comes with.
+type Aligned = [(f64, f64); 2];
+
+fn aligned((o, residual): &(Observation, Vector2<f64>)) -> Aligned {
+    let eigen = o.covariance_px2.symmetric_eigen();
+    let along = eigen.eigenvectors.tr_mul(residual);
+    [0, 1].map(|k| (along[k] * along[k], eigen.eigenvalues[k]))
 }
 
-impl Aligned {
-    fn new(o: &Observation, residual: &Vector2<f64>) -> Aligned {
-        let eigen = o.covariance_px2.symmetric_eigen();
-        let along = eigen.eigenvectors.tr_mul(residual);
-        Aligned {
-            squares: [along.x * along.x, along.y * along.y],
-            variances: [eigen.eigenvalues[0], eigen.eigenvalues[1]],
-        }
-    }
-
-    /// Squared length in units of the covariance with `added` to both variances, px^2.
-    fn chi(&self, added: f64) -> f64 {
-        let floor = FLOOR_PX * FLOOR_PX;
-        self.squares[0] / (self.variances[0] + added).max(floor)
-            + self.squares[1] / (self.variances[1] + added).max(floor)
-    }
+/// Squared lengths in units of the covariances with `added` to both variances.
+fn chi_squares(residuals: &[Aligned], added: f64) -> Vec<f64> {
+    let part = |(square, variance): (f64, f64)| square / (variance + added).max(FLOOR_PX * FLOOR_PX);
+    residuals.iter().map(|[a, b]| part(*a) + part(*b)).collect()
 }
 
 /// Finds the model whose `reduced` chi-square is one.
@@ -157,12 +147,12 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
     if residuals.iter().all(|(o, _)| o.covariance_px2.m11 == 0.0) {
         return Noise { factor: 1.0, added_px: plain.sqrt(), reduced_chi_square: None };
     }
-    let aligned: Vec<Aligned> = residuals.iter().map(|(o, r)| Aligned::new(o, r)).collect();
-    let with = |added: f64| reduced(&mut aligned.iter().map(|a| a.chi(added)).collect::<Vec<f64>>());
+    let aligned: Vec<Aligned> = residuals.iter().map(aligned).collect();
+    let with = |added: f64| reduced(&mut chi_squares(&aligned, added));
     let known = residuals.iter().all(|(o, _)| o.covariance_px2.m11 > 0.0);
     let own = known.then(|| with(0.0));
     if let Some(own) = own.filter(|own| *own <= 1.0) {
-        let factor = shrunk(&aligned.iter().map(|a| a.chi(0.0)).collect::<Vec<f64>>(), own, &reduced);
+        let factor = shrunk(&chi_squares(&aligned, 0.0), own, &reduced);
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
     // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse of the

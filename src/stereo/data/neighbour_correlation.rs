@@ -20,7 +20,6 @@ pub const SURE: f64 = 4.0;
 /// Correlation across the joining edge of two windows that both hold all of it.
 const WHOLE_OVERLAP: f64 = 0.5;
 
-/// Correlation of neighbouring corners' residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct NeighbourCorrelation {
     /// Of the components along the line that joins the two.

@@ -9,11 +9,8 @@ use crate::stereo::model::board_shape::{NUMBERS, height_mm, lift};
 /// A corner of the board seen in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Observation {
-    /// In which picture.
     pub side: Side,
-    /// Column on the board.
     pub col: usize,
-    /// Row on the board.
     pub row: usize,
     /// Place on a flat board, mm, in the board's frame.
     pub board_mm: Point3<f64>,

@@ -1,6 +1,6 @@
 //! What one pair of pictures shows of the board.
 
-use nalgebra::{Matrix2, Vector3};
+use nalgebra::Matrix2;
 
 use crate::imaging::{Board, Corner, PairCorners, Side};
 use crate::stereo::data::Observation;
@@ -12,9 +12,7 @@ const COARSE_PX: f64 = 1.0;
 /// What one pair of pictures shows of the board: left corners first, then right.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// Name of the pair.
     pub pair: String,
-    /// Its corners.
     pub observations: Vec<Observation>,
 }
 
@@ -37,12 +35,10 @@ impl View {
         View { pair: corners.pair.clone(), observations }
     }
 
-    /// Active corners of one picture.
     pub fn active(&self, side: Side) -> impl Iterator<Item = &Observation> + Clone {
         self.observations.iter().filter(move |o| o.active && o.side == side)
     }
 
-    /// Only the corners of one picture.
     pub fn only(&self, side: Side) -> View {
         let observations = self.observations.iter().copied().filter(|o| o.side == side).collect();
         View { pair: self.pair.clone(), observations }
@@ -103,17 +99,7 @@ fn observation(board: &Board, side: Side, corner: &Corner) -> Observation {
         .covariance_px2
         .filter(|c| c.iter().all(|v| v.is_finite()) && c.m11 > 0.0 && c.determinant() > 0.0)
         .unwrap_or_else(|| if corner.used { Matrix2::zeros() } else { Matrix2::identity() * (COARSE_PX * COARSE_PX) });
-    Observation {
-        side,
-        col: corner.col,
-        row: corner.row,
-        board_mm,
-        lift: lift(board, &board_mm),
-        px: corner.px,
-        covariance_px2,
-        reach: corner.reach.unwrap_or([0.0; 2]),
-        seen_off_mm: Vector3::zeros(),
-        whitener: Matrix2::identity(),
-        active: true,
-    }
+    let (lift, reach) = (lift(board, &board_mm), corner.reach.unwrap_or([0.0; 2]));
+    let point = Observation::of_point(side, corner.px, 1.0);
+    Observation { col: corner.col, row: corner.row, board_mm, lift, covariance_px2, reach, ..point }
 }

@@ -17,8 +17,7 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::{Layout, Shared};
-use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::missed::{Missed, TIMES};
+use crate::stereo::pairs::{Cause, Missed, TIMES};
 use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem};
 

@@ -6,7 +6,6 @@ use crate::stereo::model::Layout;
 use crate::stereo::pairs::Cause;
 use crate::stereo::{Rig, Side};
 
-/// A cause with its direction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hypothesis {
     pub cause: Cause,

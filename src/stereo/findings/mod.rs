@@ -62,13 +62,11 @@ pub enum Kind {
 pub struct Finding {
     /// The cause, or the causes that these pairs do not tell apart, with `|` between them.
     pub cause: String,
-    /// Over which pairs.
     pub kind: Kind,
     /// The pairs: those from the step on, all that drift, or those that something happened to.
     pub pairs: Vec<String>,
     /// By how much, from before the step to after it or from the first pair to the last.
     pub size: Option<f64>,
-    /// Unit of the size.
     pub unit: &'static str,
     /// By how much it moves a length in the volume, mm.
     pub effect_mm: Option<f64>,
@@ -115,11 +113,6 @@ impl Along {
         &self.whole * share - &self.common
     }
 
-    /// From the rig that is taken to the one at the last pair.
-    pub fn to_last(&self) -> DVector<f64> {
-        self.to(1.0)
-    }
-
     /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step; `noise` is the variance of
     /// the corners without the change over the one that they were weighed by, at which the pairs scatter at least.
     pub fn sigma_of(&self, share: f64, noise: f64) -> DVector<f64> {
@@ -163,7 +156,6 @@ pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     found
 }
 
-/// A pattern over the series.
 struct Pattern {
     kind: Kind,
     first: usize,
@@ -311,6 +303,8 @@ fn finding(
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
     let cause = Cause::words(equals.iter().map(|c| c.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)));
+    let Change { common, gain, scatter, .. } = shown.change.clone();
+    let along = Along { whole, common, by_pair: best.by_pair.clone(), gain, scatter };
     Some(Finding {
         remedy: hold(&cause, None),
         cause,
@@ -320,13 +314,7 @@ fn finding(
         unit,
         effect_mm: Some(effect_mm),
         action,
-        along: Some(Along {
-            whole,
-            common: shown.change.common.clone(),
-            by_pair: best.by_pair.clone(),
-            gain: shown.change.gain,
-            scatter: shown.change.scatter,
-        }),
+        along: Some(along),
     })
 }
 

@@ -43,9 +43,8 @@ pub fn explain(error: Error, corners: &Corners, fitting: impl Fn(&Corners) -> Op
         Some(Error::ChangedSide { what, fit, of })
     };
     let open = corners.board.turns_left_open();
-    TRIED
-        .into_iter()
-        .find_map(shift)
+    let shifted = TRIED.into_iter().find_map(shift);
+    shifted
         .or_else(|| turns().find_map(|quarters| changed(OneSide::Mirrored, quarters)))
         .or_else(|| turns().filter(|q| !open.contains(q)).find_map(|quarters| changed(OneSide::Inverted, quarters)))
         .unwrap_or(error)

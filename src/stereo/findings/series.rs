@@ -96,7 +96,6 @@ impl Linear {
         Some(Linear { matrices, gradients, inverse, places })
     }
 
-    /// How many pairs there are.
     pub fn pairs(&self) -> usize {
         self.matrices.len()
     }

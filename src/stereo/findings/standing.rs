@@ -10,7 +10,7 @@ use nalgebra::DVector;
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
-use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by_pairs, calibrate_with};
+use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
 use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, rolling_shutter, without_drift};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -27,11 +27,9 @@ const MIDDLE: f64 = 0.5;
 /// What is asked of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Asked {
-    /// Lens and board.
     pub options: Options,
     /// The largest error that passes, mm.
     pub tolerance_mm: f64,
-    /// The volume.
     pub extent: Extent,
 }
 
@@ -52,7 +50,7 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
 }
 
 fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut with_runs = calibrate_with(corners, &asked.options, true);
+    let mut with_runs = calibrate_by(corners, &asked.options, true, false);
     let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
     if with_runs.as_ref().is_ok_and(|found| found.each_alone)
         && let Some((by_pairs, change)) = by_pairs(corners, asked)
@@ -78,7 +76,7 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
 /// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig by more than each camera
 /// misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and looks like something that moved between the two.
 fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
-    let found = calibrate_by_pairs(corners, &asked.options).ok().filter(|found| found.runs == 0)?;
+    let found = calibrate_by(corners, &asked.options, true, true).ok().filter(|found| found.runs == 0)?;
     let change = change(&found, asked).filter(|change| change.kind == Kind::Drift)?;
     let still = without_drift::at_share(&found, corners, &asked.options, change.along.as_ref()?, MIDDLE)?;
     (!still.each_alone).then_some((found, change))
@@ -260,13 +258,13 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
                 None => found.move_rig(&along.to(MIDDLE)),
             }
         }
-        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE, noise) } else { along.to_last() }];
+        let mut within = vec![if change.kind == Kind::Drift { along.sigma_of(MIDDLE, noise) } else { along.to(1.0) }];
         if change.kind == Kind::Drift {
             *along = along.seen_from(MIDDLE);
-            found.since_moment.push(along.to_last());
+            found.since_moment.push(along.to(1.0));
             // Of a board that grows nobody knows at which pair it had its size.
             if board_may_grow {
-                within.push(along.to_last());
+                within.push(along.to(1.0));
             }
         }
         allow_for(found, &within);
@@ -279,8 +277,8 @@ fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: 
 
 /// Adds steps that the rig may be off by to its uncertainty.
 fn allow_for(found: &mut Calibration, steps: &[DVector<f64>]) {
-    steps.iter().for_each(|step| found.uncertainty.shared += step * step.transpose());
-    let matrix = found.uncertainty.shared.clone();
+    steps.iter().for_each(|step| found.covariance += step * step.transpose());
+    let matrix = found.covariance.clone();
     found.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
 }
 

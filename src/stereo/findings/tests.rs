@@ -146,7 +146,7 @@ fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
         let off =
             (found.rig().right_from_left.rotation * turned(0.5).rig.right_from_left.rotation.inverse()).scaled_axis().y;
         let at = found.layout.transform_start() + 1;
-        let sigma = found.uncertainty.shared[(at, at)].sqrt();
+        let sigma = found.covariance[(at, at)].sqrt();
         let limit = 4.0 * sigma;
         assert!(off.abs() < limit, "{size_deg} deg in world {w}: {off} against {limit}");
         let since = found.since_moment[0][at];
@@ -154,7 +154,7 @@ fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
         // What drifted is known, and counts as no scatter of the pairs; of a board that may have grown it is not known where it began.
         let still = standing(&world.corners(22)).0;
         for (at, most) in [(0, most_focal), (at, 1.6)] {
-            let [sigma, still] = [&found, &still].map(|found| found.uncertainty.shared[(at, at)].sqrt());
+            let [sigma, still] = [&found, &still].map(|found| found.covariance[(at, at)].sqrt());
             let other_board = causes[0].contains("other-board");
             assert!(other_board || sigma < most * still, "{size_deg} deg in world {w}: {sigma} against {still}");
         }

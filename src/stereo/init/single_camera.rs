@@ -49,16 +49,12 @@ pub fn one_camera(views: &[View], side: Side, size: (u32, u32), diagonal_mm: f64
     if !focals.iter().any(|(fx, fy)| (0.2..50.0).contains(&(fx / longer)) && (0.5..2.0).contains(&(fx / fy))) {
         focals.extend(USUAL_FOCAL_SHARES.map(|share| (share * longer, share * longer)));
     }
-    focals
-        .into_iter()
-        .filter_map(|(fx, fy)| {
-            let mut camera = Camera::pinhole(size.0, size.1, fx);
-            camera.fy = fy;
-            camera.lens = FIRST_LENS;
-            from_focal_length(&pictures, &homographies, &good, camera, diagonal_mm)
-        })
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, one)| one)
+    let of_focal = |(fx, fy): (f64, f64)| {
+        let camera = Camera { fy, lens: FIRST_LENS, ..Camera::pinhole(size.0, size.1, fx) };
+        from_focal_length(&pictures, &homographies, &good, camera, diagonal_mm)
+    };
+    let best = focals.into_iter().filter_map(of_focal).min_by(|a, b| a.0.total_cmp(&b.0));
+    best.map(|(_, one)| one)
 }
 
 /// A camera whose lens is known, with the boards' poses in its pictures.

@@ -3,7 +3,7 @@
 use crate::diagnostic::Warning;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
-use crate::stereo::judge::evidence::{self, Evidence};
+use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::ledger::{Case, Facts, KNOWN_MOVE, LensPairs, Standards, TOLERANCE, ledger};
 use crate::stereo::judge::lengths::held_out::Accuracy;
 use crate::stereo::judge::lengths::model_disagreement;
@@ -80,7 +80,8 @@ impl Judged {
         let other_board = facts.findings.iter().any(|finding| finding.cause == Cause::OtherBoard.word());
         let print_scatter = if other_board { None } else { print_scatter(calibration, &facts) };
         warnings.extend(print_scatter.clone());
-        let (verdict, advice) = (evidence::verdict(&evidence), facts.coverage.advice());
+        let verdict = evidence.iter().fold(Verdict::Pass, |verdict, line| verdict.and(line.allows));
+        let advice = facts.coverage.advice();
         Judged { facts, verdict, evidence, print_scatter, advice, warnings }
     }
 

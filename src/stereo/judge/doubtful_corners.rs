@@ -14,7 +14,6 @@ pub const CONTRADICTED: f64 = 5.3;
 /// Share of the corners up to which they are exceptions; beyond it they are what this rig delivers, and every length counts.
 const EXCEPTIONS: f64 = 0.1;
 
-/// The doubtful corners of some pairs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DoubtfulCorners {
     /// Corners that both pictures show.

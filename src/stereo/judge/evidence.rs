@@ -92,8 +92,3 @@ impl Evidence {
         [value, limit]
     }
 }
-
-/// The verdict of the worst line.
-pub fn verdict(ledger: &[Evidence]) -> Verdict {
-    ledger.iter().fold(Verdict::Pass, |verdict, line| verdict.and(line.allows))
-}

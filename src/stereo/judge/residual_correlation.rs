@@ -26,7 +26,6 @@ const HARMLESS: f64 = 0.05;
 pub struct Cell {
     /// Middle of the cell, px.
     pub x_px: f64,
-    /// Middle of the cell, px.
     pub y_px: f64,
     pub corners: usize,
     /// Mean residual (predicted minus seen), px; zero where there are none.
@@ -36,7 +35,6 @@ pub struct Cell {
 /// The residuals of one picture, cell by cell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Field {
-    /// Which picture.
     pub side: &'static str,
     /// Row by row.
     pub cells: Vec<Cell>,
@@ -70,7 +68,6 @@ impl ResidualPattern {
     }
 }
 
-/// Looks for patterns.
 pub fn check(calibration: &Calibration) -> ResidualPattern {
     let shared = &calibration.values.shared;
     let mut fields = Side::BOTH.map(|side| Gather::new(side, shared.rig.camera(side)));
@@ -85,52 +82,39 @@ pub fn check(calibration: &Calibration) -> ResidualPattern {
 struct Gather {
     side: Side,
     size: [f64; 2],
-    sums: Vec<Vector2<f64>>,
-    variances: Vec<f64>,
-    counts: Vec<usize>,
+    /// Of each cell: corners, the sum of their residuals and that of the squares.
+    sums: Vec<(usize, Vector2<f64>, f64)>,
 }
 
 impl Gather {
     fn new(side: Side, camera: &Camera) -> Gather {
-        let cells = CELLS * CELLS;
-        Gather {
-            side,
-            size: [camera.width, camera.height].map(|size| f64::from(size.max(1))),
-            sums: vec![Vector2::zeros(); cells],
-            variances: vec![0.0; cells],
-            counts: vec![0; cells],
-        }
+        let size = [camera.width, camera.height].map(|size| f64::from(size.max(1)));
+        Gather { side, size, sums: vec![(0, Vector2::zeros(), 0.0); CELLS * CELLS] }
     }
 
     fn add(&mut self, o: &Observation, residual: Vector2<f64>) {
         let cell = |at: f64, size: f64| (((at + 0.5) / size * CELLS as f64).max(0.0) as usize).min(CELLS - 1);
-        let i = cell(o.px.y, self.size[1]) * CELLS + cell(o.px.x, self.size[0]);
-        self.sums[i] += residual;
-        self.variances[i] += residual.norm_squared();
-        self.counts[i] += 1;
+        let (n, sum, squares) = &mut self.sums[cell(o.px.y, self.size[1]) * CELLS + cell(o.px.x, self.size[0])];
+        *n += 1;
+        *sum += residual;
+        *squares += residual.norm_squared();
     }
 
     fn finish(self) -> Field {
         let (mut systematic, mut corners) = (0.0, 0usize);
-        let cells = (0..CELLS * CELLS)
-            .map(|i| {
-                let n = self.counts[i];
-                let mean = self.sums[i] / n.max(1) as f64;
-                if n > 1 {
-                    // Noise alone leaves its variance over n in the square of a mean.
-                    let noise = (self.variances[i] / n as f64 - mean.norm_squared()) / (n as f64 - 1.0);
-                    systematic += n as f64 * (mean.norm_squared() - noise);
-                    corners += n;
-                }
-                let middle = |k: usize, size: f64| (k as f64 + 0.5) * size / CELLS as f64 - 0.5;
-                Cell {
-                    x_px: middle(i % CELLS, self.size[0]),
-                    y_px: middle(i / CELLS, self.size[1]),
-                    corners: n,
-                    mean_px: [mean.x, mean.y],
-                }
-            })
-            .collect();
+        let cell = |(i, &(n, sum, squares)): (usize, &(usize, Vector2<f64>, f64))| {
+            let mean = sum / n.max(1) as f64;
+            if n > 1 {
+                // Noise alone leaves its variance over n in the square of a mean.
+                let noise = (squares / n as f64 - mean.norm_squared()) / (n as f64 - 1.0);
+                systematic += n as f64 * (mean.norm_squared() - noise);
+                corners += n;
+            }
+            let middle = |k: usize, size: f64| (k as f64 + 0.5) * size / CELLS as f64 - 0.5;
+            let [x_px, y_px] = [middle(i % CELLS, self.size[0]), middle(i / CELLS, self.size[1])];
+            Cell { x_px, y_px, corners: n, mean_px: mean.into() }
+        };
+        let cells = self.sums.iter().enumerate().map(cell).collect();
         let systematic_px = (systematic / corners.max(1) as f64).max(0.0).sqrt();
         Field { side: self.side.name(), cells, systematic_px }
     }

@@ -74,7 +74,6 @@ pub struct LengthError {
     pub corners_mm: f64,
     /// Through the calibration that both ends share, mm.
     pub calibration_mm: f64,
-    /// How they are expanded.
     pub expansion: Expansion,
 }
 
@@ -103,7 +102,6 @@ impl LengthError {
 /// The length errors that decide.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extremes {
-    /// The largest absolute error, mm.
     pub max_abs_error_mm: f64,
     /// The length whose error may be largest.
     pub largest: LengthError,

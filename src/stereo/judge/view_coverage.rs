@@ -47,7 +47,6 @@ pub struct Coverage {
 }
 
 impl Coverage {
-    /// Looks how the views are spread.
     pub fn of(calibration: &Calibration, residual_pattern: &ResidualPattern) -> Coverage {
         let poses = &calibration.values.poses;
         let [x_least, x_most, y_least, y_most] = tilts_deg(&calibration.values);

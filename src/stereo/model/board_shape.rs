@@ -11,7 +11,6 @@ pub const NAMES: [&str; NUMBERS] = ["board.kx_mm", "board.ky_mm", "board.kxy_mm"
 /// How many numbers a shape has.
 pub const NUMBERS: usize = 3;
 
-/// The shape of a flat board.
 pub const FLAT: [f64; NUMBERS] = [0.0; NUMBERS];
 
 /// Height of a place of a bent board, mm, from how much one unit of each number lifts it.

@@ -76,16 +76,9 @@ pub struct Camera {
 impl Camera {
     /// A camera without distortion.
     pub fn pinhole(width: u32, height: u32, focal_px: f64) -> Camera {
-        Camera {
-            width,
-            height,
-            fx: focal_px,
-            fy: focal_px,
-            cx: (f64::from(width) - 1.0) / 2.0,
-            cy: (f64::from(height) - 1.0) / 2.0,
-            lens: Lens::Radial2,
-            distortion: [0.0; 14],
-        }
+        let [cx, cy] = [width, height].map(|size| (f64::from(size) - 1.0) / 2.0);
+        let (lens, distortion) = (Lens::Radial2, [0.0; 14]);
+        Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens, distortion }
     }
 
     /// Where a point in the camera's frame (mm, any scale) falls in the raw picture, px. The point must lie in front (z > 0).
@@ -147,7 +140,6 @@ impl Camera {
         Matrix3::new(self.fx, 0.0, self.cx, 0.0, self.fy, self.cy, 0.0, 0.0, 1.0)
     }
 
-    /// As OpenCV takes it.
     pub fn for_opencv(&self) -> crate::opencv::Lens<'_> {
         let distortion = &self.distortion[..self.lens.vector_length()];
         crate::opencv::Lens { matrix: self.matrix(), distortion, size: (self.width, self.height) }

@@ -24,7 +24,6 @@ pub struct Shared {
 /// Values of all unknowns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
-    /// The rig and the board's shape.
     pub shared: Shared,
     /// `left_from_board` of every view.
     pub poses: Vec<Transform>,
@@ -81,7 +80,6 @@ impl Layout {
         self.camera_count(Side::Left) + self.camera_count(Side::Right)
     }
 
-    /// Where the shape begins.
     pub fn shape_start(&self) -> usize {
         self.transform_start() + if self.transform { 6 } else { 0 }
     }

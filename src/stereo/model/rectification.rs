@@ -10,6 +10,7 @@ use serde::Serialize;
 use crate::geometry::rotation_matrix;
 use crate::imaging::PairCorners;
 use crate::opencv::{Failure, Lens, ZERO_DISPARITY, stereo_rectify, undistort_points};
+use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::{Camera, Rig, Side};
 
 /// How much of the raw pictures is kept, in OpenCV's words.
@@ -105,9 +106,7 @@ pub fn fundamental(rig: &Rig) -> Option<Matrix3<f64>> {
 pub struct RowResidual {
     /// Points seen in both pictures.
     pub corners: usize,
-    /// RMS of the differences, px.
     pub rms_px: f64,
-    /// The largest, px.
     pub max_px: f64,
 }
 
@@ -121,13 +120,9 @@ pub fn row_differences(pair: &PairCorners, in_columns: bool) -> Vec<(Point2<f64>
 
 /// The residual of differences; `None` without any.
 pub fn row_residual(differences: &[f64]) -> Option<RowResidual> {
-    if differences.is_empty() {
-        return None;
-    }
-    let square_sum: f64 = differences.iter().map(|d| d * d).sum();
     Some(RowResidual {
         corners: differences.len(),
-        rms_px: (square_sum / differences.len() as f64).sqrt(),
+        rms_px: root_mean_square(differences.iter().map(|d| d * d))?,
         max_px: differences.iter().fold(0.0, |most, d| most.max(d.abs())),
     })
 }

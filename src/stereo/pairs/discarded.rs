@@ -106,16 +106,13 @@ impl Cause {
 /// A pair that is not used.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiscardedPair {
-    /// Its name.
     pub pair: String,
-    /// What happened to it.
     pub cause: Cause,
     /// The same for a person, with figures.
     pub reason: String,
 }
 
 impl DiscardedPair {
-    /// A pair and what happened to it.
     pub fn new(pair: &str, cause: Cause, reason: String) -> DiscardedPair {
         DiscardedPair { pair: pair.to_owned(), cause, reason }
     }

@@ -2,7 +2,6 @@
 
 pub mod candidates;
 pub mod discarded;
-pub mod missed;
 pub mod mixups;
 mod moved;
 pub mod numbering;
@@ -22,4 +21,33 @@ const FEWEST_OF_KNOWN: usize = 3;
 /// Fewest pairs for a calibration with what is known of the lenses.
 pub fn fewest_pairs(known: Option<&KnownLenses>) -> usize {
     if known.is_some_and(KnownLenses::both) { FEWEST_OF_KNOWN } else { FEWEST_PAIRS }
+}
+
+/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment: a lens or a rig
+/// that lacks something leaves no more than about this.
+pub const TIMES: f64 = 3.0;
+
+/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in the rig is twice that in
+/// one camera.
+const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
+
+/// How far pictures are usually missed, px.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Missed {
+    /// By each camera alone, the median over its own pictures.
+    pub alone_px: f64,
+    /// By the rig of all pairs, the median over them.
+    pub paired_px: f64,
+}
+
+impl Missed {
+    /// Whether the two pictures of the pairs were usually not taken at one moment.
+    pub fn is_of_two_moments(&self) -> bool {
+        self.paired_px > TIMES * self.alone_px
+    }
+
+    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
+    pub fn is_better_alone(&self) -> bool {
+        self.paired_px > HALF_IS_LOST * self.alone_px
+    }
 }

@@ -13,10 +13,9 @@ use crate::statistics::median;
 use crate::stereo::data::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::model::Shared;
-use crate::stereo::pairs::Cause;
-use crate::stereo::pairs::missed::Missed;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;
+use crate::stereo::pairs::{Cause, Missed};
 
 /// Shares that differ by no more than this part of them are of one board.
 const ONE_SIZE: f64 = 0.1;

@@ -18,8 +18,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::missed::Missed;
-use crate::stereo::pairs::{Cause, DiscardedPair, mixups, moved, numbering};
+use crate::stereo::pairs::{Cause, DiscardedPair, Missed, mixups, moved, numbering};
 use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
 
@@ -41,7 +40,6 @@ const LARGEST_SHARE: f64 = 2e-3;
 pub struct Series {
     /// Its pairs, with right corners turned where that was needed, and a first rig with each pair's pose on it.
     pub problem: Problem,
-    /// The other pairs.
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,

@@ -48,7 +48,6 @@ pub const FEWEST_PAIRS: usize = 2;
 pub struct Before {
     /// The rig with its covariance.
     pub rig: Rig,
-    /// How corners scattered.
     pub noise: Option<Noise>,
     /// How far pairs scattered about the rig beyond that, as a variance.
     pub pair_excess: f64,
@@ -96,13 +95,11 @@ pub enum Explained {
 pub struct Recheck {
     /// Pairs that were compared.
     pub pairs: Vec<String>,
-    /// Pairs that were not, and why.
     pub skipped: Vec<Skipped>,
     /// Of those compared, pairs that contradict the old rig by themselves: what few of them say is lost among the others.
     pub strays: Vec<Stray>,
     /// Length that changes are given for, mm.
     pub length_mm: f64,
-    /// Every cause.
     pub causes: Vec<CauseSeen>,
     /// What explains the change; `None` where nothing changed.
     pub change: Option<Explained>,
@@ -112,7 +109,6 @@ pub struct Recheck {
     pub seen_mm: f64,
 }
 
-/// Compares.
 pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     before.rig.check_size(corners)?;
     let (problem, mut skipped) = start(before, corners);

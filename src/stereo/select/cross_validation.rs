@@ -89,7 +89,6 @@ pub struct Without {
     pub step: DVector<f64>,
     /// Covariance of the shared numbers, with unit variance of the whitened residuals.
     pub covariance: DMatrix<f64>,
-    /// The shared numbers.
     pub shared: Shared,
 }
 

@@ -14,7 +14,7 @@ use crate::stereo::init::board_pose;
 use crate::stereo::init::single_camera::as_left;
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Covariance, KnownLenses, Layout, Shared, Values};
-use crate::stereo::pairs::missed::Missed;
+use crate::stereo::pairs::Missed;
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Camera, Lens, Rig};
@@ -76,7 +76,7 @@ fn one(start: &Problem, board: &Board, lens: Lens, side: Side) -> Option<Alone> 
     let (solved, layout) = problem.solve_bent_or_flat(None, alone).ok()?;
     let scatter = stated_uncertainty::excess_scatter(&solved, &layout);
     let count = layout.camera_count(Side::Left);
-    let covariance = solved.uncertainty(&layout).ok()?.shared.view((0, 0), (count, count)) * scatter;
+    let covariance = solved.covariance(&layout).ok()?.view((0, 0), (count, count)) * scatter;
     Some(Alone { camera: solved.shared().rig.left, covariance, scatter_px: scatter_px(&solved) })
 }
 
@@ -100,13 +100,13 @@ mod tests {
                 let truth = world.rig.right_from_left;
                 let turn = (rig.rotation * truth.rotation.inverse()).scaled_axis();
                 let shift = rig.translation.vector - truth.translation.vector;
-                link += (0..3).map(|k| turn[k].powi(2) / found.uncertainty.shared[(at + k, at + k)]).sum::<f64>();
-                link += (3..6).map(|k| shift[k - 3].powi(2) / found.uncertainty.shared[(at + k, at + k)]).sum::<f64>();
+                link += (0..3).map(|k| turn[k].powi(2) / found.covariance[(at + k, at + k)]).sum::<f64>();
+                link += (3..6).map(|k| shift[k - 3].powi(2) / found.covariance[(at + k, at + k)]).sum::<f64>();
                 for (at, [found_px, true_px]) in [
                     (0, [found.rig().left.fx, world.rig.left.fx]),
                     (found.layout.camera_start(Side::Right), [found.rig().right.fx, world.rig.right.fx]),
                 ] {
-                    let sigma_px = found.uncertainty.shared[(at, at)].sqrt();
+                    let sigma_px = found.covariance[(at, at)].sqrt();
                     // Corners of 0.05 px tell 2000 px to about 1.5, however far the pairs miss their rig.
                     assert!(sigma_px < 4.0, "{turn_deg} deg, {seed}: {sigma_px}");
                     off += ((found_px - true_px) / sigma_px).powi(2);

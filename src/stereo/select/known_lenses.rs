@@ -229,12 +229,9 @@ fn causes(known: &KnownLenses, pictures: &Pictures, difference: &Difference) -> 
 /// What the difference is and what explains it, in words.
 fn statement(known: &KnownLenses, pictures: &Pictures, causes: &[Explanation]) -> String {
     let told: Vec<String> = causes.iter().map(|explanation| cause_in_words(known, pictures, explanation)).collect();
-    match told.split_first() {
-        None => "the pictures agree with the known lenses".to_owned(),
-        Some((first, [])) => format!("the pictures contradict the known lenses: {first}"),
-        Some((first, others)) => {
-            format!("the pictures contradict the known lenses: {first}, or {}", others.join(", or "))
-        }
+    match told.is_empty() {
+        true => "the pictures agree with the known lenses".to_owned(),
+        false => format!("the pictures contradict the known lenses: {}", told.join(", or ")),
     }
 }
 

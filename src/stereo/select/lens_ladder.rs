@@ -11,7 +11,7 @@
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
-use crate::stereo::pairs::missed::Missed;
+use crate::stereo::pairs::Missed;
 use crate::stereo::select::model_comparison::{Chance, LensScore, OF_PAIR, Trial, gain_of_terms, score, simplest};
 use crate::stereo::select::options::{Choice, KnownScatter, Options, SIMPLEST};
 use crate::stereo::select::stated_uncertainty;
@@ -35,12 +35,9 @@ pub fn choose(
     }
     let of_pairs = of_pairs(start, board, options).map(|choice| choice.below(below));
     let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
-    let of = |Choice { layout, near, priors, .. }: &Choice| {
-        let values = near.clone().unwrap_or_else(|| start.values.clone());
-        Problem { values, priors: priors.clone(), views: start.views.clone() }.solve(layout).ok()
-    };
-    let lens = of_pairs.as_ref().ok().and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
-    let paired = of_pairs.as_ref().ok().and_then(of);
+    let chosen = of_pairs.as_ref().ok();
+    let lens = chosen.and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
+    let paired = chosen.and_then(|choice| choice.solve(start).ok());
     let Some(known) = each_alone::lenses(start, board, lens, paired.as_ref(), missed) else { return of_pairs };
     let scores = of_pairs.map_or(Vec::new(), |choice| choice.scores);
     let choice = known_lenses::choose(start, &known, options)?;
@@ -134,7 +131,7 @@ fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<S
     }
     let wide = Layout::rig(Lens::Rational8, layout.shape);
     let solved = Problem { values: simplest.problem.values.clone(), ..start.clone() }.solve(&wide).ok()?;
-    solved.uncertainty(&wide).ok()?;
+    solved.covariance(&wide).ok()?;
     let added = (wide.count() - layout.count()) as f64;
     let gain = solved.log_likelihood - simplest.log_likelihood;
     (2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
@@ -158,7 +155,7 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
 /// them are free and the pairs do not tell them apart, the terms after them do not need them.
 fn priors_of_forced(start: &Problem, layout: &Layout) -> Priors {
     let holds = layout.left > Some(Lens::Rational8)
-        && start.solve(layout).and_then(|solved| solved.uncertainty(layout)).is_err();
+        && start.solve(layout).and_then(|solved| solved.covariance(layout)).is_err();
     if holds { start.priors.holding_rational() } else { start.priors.clone() }
 }
 

@@ -112,7 +112,7 @@ impl Trial {
         let values = problem.refit(&layout)?;
         let views = &problem.views;
         let equations = levenberg_marquardt::equations(views, &layout, &problem.priors, &values, Loss::Squared)?;
-        let covariance = uncertainty::of_equations(&equations)?.shared;
+        let covariance = uncertainty::covariance(&equations)?;
         let is_told = worst_focal_sigma(&covariance, &layout, &values.shared.rig) <= WORST_FOCAL_SIGMA;
         let trial = Trial {
             layout,

@@ -1,9 +1,9 @@
 //! What may be forced or known of lens and board, and what was chosen.
 
-use crate::stereo::Lens;
 use crate::stereo::model::{KnownLenses, Layout, Values};
 use crate::stereo::select::model_comparison::{LensScore, Trial};
-use crate::stereo::solve::Priors;
+use crate::stereo::solve::{Priors, Problem, Solved};
+use crate::stereo::{Error, Lens};
 
 /// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
 /// lenses, so that nothing simpler is needed.
@@ -29,7 +29,6 @@ pub struct KnownScatter {
     pub pairs: f64,
 }
 
-/// What was chosen.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// What is free.
@@ -45,6 +44,11 @@ pub struct Choice {
 }
 
 impl Choice {
+    /// The pairs with what was chosen for them.
+    pub fn solve(&self, start: &Problem) -> Result<Solved, Error> {
+        let values = self.near.clone().unwrap_or_else(|| start.values.clone());
+        Problem { values, priors: self.priors.clone(), views: start.views.clone() }.solve(&self.layout)
+    }
     /// The same where its lens is simpler than this one, or else the richest that is.
     pub fn below(self, lens: Option<Lens>) -> Choice {
         let is_below = lens.is_none() || self.layout.left < lens;

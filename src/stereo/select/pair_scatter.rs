@@ -17,7 +17,6 @@ use crate::stereo::select::cross_validation::Without;
 use crate::stereo::select::pair_motion;
 use crate::stereo::solve::Equations;
 
-/// How the pairs scatter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairScatter {
     /// Groups of pairs with poses of their own.

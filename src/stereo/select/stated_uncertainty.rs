@@ -16,7 +16,7 @@ use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::options::KnownScatter;
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
 use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
-use crate::stereo::solve::{Equations, Problem, Solved, Uncertainty};
+use crate::stereo::solve::{Problem, Solved};
 use crate::stereo::{Lens, Rig};
 
 /// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
@@ -37,32 +37,22 @@ pub struct Witness {
     step: DVector<f64>,
 }
 
-/// What is stated of a solution.
-pub struct Stated {
-    /// Covariance of the shared numbers and of each pose.
-    pub uncertainty: Uncertainty,
-    /// How the pairs scatter.
-    pub pair_scatter: PairScatter,
-    /// Richer models that are witnesses of another rig.
-    pub witnesses: Vec<Witness>,
-}
-
 /// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers scatter by where lenses are
-/// `known` at least. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// `known` at least; with how the pairs scatter, and the richer models that are witnesses of another rig. `print_excess`: see
+/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
-    by_noise: Uncertainty,
+    by_noise: DMatrix<f64>,
     inflation: f64,
     scores: &[LensScore],
     known: Option<KnownScatter>,
     print_excess: f64,
-) -> Stated {
+) -> (DMatrix<f64>, PairScatter, Vec<Witness>) {
     let [lenses, pairs] = known.map_or([1.0; 2], |known| [known.lenses, known.pairs].map(|v| (v / inflation).max(1.0)));
-    let found = scattered(solved, layout, &by_noise.shared, inflation, [lenses, pairs]);
-    let Some((equations, mut shared, pair_scatter)) = found else {
+    let Some((mut covariance, pair_scatter)) = scattered(solved, layout, &by_noise, inflation, [lenses, pairs]) else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
-        return Stated { uncertainty: by_noise.scaled(lenses), pair_scatter, witnesses: Vec::new() };
+        return (by_noise * lenses, pair_scatter, Vec::new());
     };
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(lenses);
     let richer = richer(layout, scores, known.is_some());
@@ -72,17 +62,17 @@ pub fn state(
     let lenses = witnesses.iter().filter(|w| w.layout.left != layout.left);
     let likeliest = lenses.max_by(|a, b| gain(a).total_cmp(&gain(b)));
     for witness in likeliest.into_iter().chain(witnesses.iter().filter(|w| w.layout.left == layout.left)) {
-        shared += &witness.step * witness.step.transpose();
+        covariance += &witness.step * witness.step.transpose();
     }
-    Stated { uncertainty: by_noise.with_shared(shared, &equations.blocks), pair_scatter, witnesses }
+    (covariance, pair_scatter, witnesses)
 }
 
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the
 /// corners. `None` where the pairs do not tell how they scatter.
 pub fn told_scatter(solved: &Solved, layout: &Layout) -> Option<f64> {
     let inflation = solved.inflation();
-    let by_noise = solved.uncertainty(layout).ok()?.scaled(inflation);
-    let ratio = scattered(solved, layout, &by_noise.shared, inflation, [1.0; 2])?.2.ratio?;
+    let by_noise = solved.covariance(layout).ok()? * inflation;
+    let ratio = scattered(solved, layout, &by_noise, inflation, [1.0; 2])?.1.ratio?;
     Some(inflation * ratio.max(1.0))
 }
 
@@ -98,14 +88,14 @@ pub fn scatter_beside(solved: &Solved, layout: &Layout, pair_excess: f64, noise:
     [scatter, scatter / solved.inflation()]
 }
 
-/// The normal equations, the covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
+/// The covariance of the shared numbers that allows for the pairs' scatter, and that scatter.
 fn scattered(
     solved: &Solved,
     layout: &Layout,
     by_noise: &DMatrix<f64>,
     inflation: f64,
     [lenses, least]: [f64; 2],
-) -> Option<(Equations, DMatrix<f64>, PairScatter)> {
+) -> Option<(DMatrix<f64>, PairScatter)> {
     let Problem { views, values, .. } = &solved.problem;
     let groups = cross_validation::groups(views, &values.poses);
     let (equations, curvature) = (solved.problem.equations(layout)?, solved.curvature(layout)?);
@@ -114,29 +104,20 @@ fn scattered(
     let (group_of, without) = (groups.as_slice(), without.as_slice());
     let jackknife =
         Jackknife { equations: &equations, curvature: &curvature, group_of, layout, without, least, lenses };
-    let (shared, pair_scatter) = jackknife.covariance(by_noise, inflation);
-    Some((equations, shared, pair_scatter))
+    Some(jackknife.covariance(by_noise, inflation))
 }
 
 fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f64) -> Vec<Witness> {
     let Some(chosen) = Trial::new(problem, *layout) else { return Vec::new() };
-    richer
-        .into_iter()
-        .filter_map(|richer| {
-            let trial = Trial::new(problem, richer)?;
-            let added = richer.count().checked_sub(layout.count())?;
-            let chi_square_fall = (chosen.chi_square - trial.chi_square) / factor;
-            let step = step(layout, &chosen.values.shared, &trial.values.shared);
-            let rig = trial.values.shared.rig;
-            (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(Witness {
-                layout: richer,
-                rig,
-                added,
-                chi_square_fall,
-                step,
-            })
-        })
-        .collect()
+    let witness = |richer: Layout| {
+        let trial = Trial::new(problem, richer)?;
+        let added = richer.count().checked_sub(layout.count())?;
+        let chi_square_fall = (chosen.chi_square - trial.chi_square) / factor;
+        let step = step(layout, &chosen.values.shared, &trial.values.shared);
+        let witness = Witness { layout: richer, rig: trial.values.shared.rig, added, chi_square_fall, step };
+        (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(witness)
+    };
+    richer.into_iter().filter_map(witness).collect()
 }
 
 /// The richer models that are asked: lenses that the pairs determine and that do not predict held-out pairs worse, or, where the lens was
@@ -181,7 +162,7 @@ mod tests {
         let bowed = calibrate(&world.corners(4), &BROWN4).unwrap();
         assert!(bowed.witnesses.iter().any(|w| w.layout.shape), "{:?}", bowed.witnesses);
         let off = (bowed.rig().left.fx - world.rig.left.fx).abs();
-        assert!(off < 2.0 * bowed.uncertainty.shared[(0, 0)].sqrt(), "{off}");
+        assert!(off < 2.0 * bowed.covariance[(0, 0)].sqrt(), "{off}");
     }
 
     #[test]

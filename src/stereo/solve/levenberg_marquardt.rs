@@ -64,24 +64,18 @@ pub enum Stop {
     Minimum,
     /// After the largest number of steps, the last of which lowered the cost by nothing that matters.
     Valley,
-    /// After the largest number of steps.
-    Steps,
-    /// Where not even a strongly damped step lowers the cost though the equations promise that one does: it jumps there.
-    Exhausted,
-    /// A corner lies behind its camera at the start, or the views do not determine the poses.
-    NoStart,
+    /// Elsewhere: after the largest number of steps; where not even a strongly damped step lowers the cost though the equations promise that one
+    /// does, as it jumps there; or at the start, with a corner behind its camera or views that do not determine the poses.
+    Elsewhere,
 }
 
 /// The end of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// The values reached.
     pub values: Values,
     /// Half the (robust) sum of squares there.
     pub cost: f64,
-    /// Why it stopped.
     pub stop: Stop,
-    /// Steps tried.
     pub steps: usize,
 }
 
@@ -89,7 +83,7 @@ pub struct Solution {
 pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, loss: Loss, search: Search) -> Solution {
     let of = |values: &Values| equations(views, layout, priors, values, loss);
     let Some(mut equations) = of(&start) else {
-        return Solution { values: start, cost: f64::INFINITY, stop: Stop::NoStart, steps: 0 };
+        return Solution { values: start, cost: f64::INFINITY, stop: Stop::Elsewhere, steps: 0 };
     };
     let mut values = start;
     let mut cost = equations.cost();
@@ -127,14 +121,14 @@ pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, lo
                 let promised =
                     try_step(layout, &values, &equations, search.first_damping).map_or(f64::INFINITY, |s| s.1);
                 let minimum = promised < NO_MATTER.max(ROUNDING * cost);
-                let stop = if minimum { Stop::Minimum } else { Stop::Exhausted };
+                let stop = if minimum { Stop::Minimum } else { Stop::Elsewhere };
                 return Solution { values, cost, stop, steps };
             }
         }
     }
     // Numbers of a rich lens that nothing tells apart make a valley without an end; along it nothing changes that matters.
     let gained = lately.front().map_or(f64::INFINITY, |before| before - cost);
-    let stop = if lately.len() > LATELY && gained < NO_MATTER { Stop::Valley } else { Stop::Steps };
+    let stop = if lately.len() > LATELY && gained < NO_MATTER { Stop::Valley } else { Stop::Elsewhere };
     Solution { values, cost, stop, steps: search.most_steps }
 }
 
@@ -178,14 +172,10 @@ fn damping_change(share: f64) -> f64 {
 
 /// The normal equations; the pairs' shares in their order. `None` where a corner would lie behind its camera.
 pub fn equations(views: &[View], layout: &Layout, priors: &Priors, values: &Values, loss: Loss) -> Option<Equations> {
-    let blocks: Option<Vec<Block>> = views
-        .par_iter()
-        .zip(&values.poses)
-        .map(|(view, pose)| normal_equations::block(&values.shared, layout, pose, view, loss))
-        .collect::<Vec<_>>()
-        .into_iter()
-        .collect();
-    Some(Equations { blocks: blocks?, prior: priors.information(layout, &values.shared) })
+    let block = |(view, pose)| normal_equations::block(&values.shared, layout, pose, view, loss);
+    let blocks: Vec<Option<Block>> = views.par_iter().zip(&values.poses).map(block).collect();
+    let blocks = blocks.into_iter().collect::<Option<Vec<Block>>>()?;
+    Some(Equations { blocks, prior: priors.information(layout, &values.shared) })
 }
 
 /// The values with each pose moved by its own Gauss-Newton step, the shared numbers as they are.

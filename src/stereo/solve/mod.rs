@@ -12,4 +12,3 @@ pub use normal_equations::Equations;
 pub use priors::Priors;
 pub use problem::{Problem, Solved};
 pub use robust_loss::Loss;
-pub use uncertainty::Uncertainty;

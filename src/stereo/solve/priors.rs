@@ -63,7 +63,6 @@ enum Number {
     Shape(usize),
 }
 
-/// All expectations.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Priors {
     all: Vec<Expectation>,
@@ -200,24 +199,18 @@ impl Priors {
         }
         let numbers = layout.numbers(shared);
         for expectation in &self.all {
-            let Some(terms) = expectation
-                .terms
-                .iter()
-                .map(|(n, by)| Some((self.place(layout, *n, expectation.known)?, *by)))
-                .collect::<Option<Vec<_>>>()
-            else {
-                continue;
-            };
+            let placed = |(number, by): &(Number, f64)| Some((self.place(layout, *number, expectation.known)?, *by));
+            let Some(terms) = expectation.terms.iter().map(placed).collect::<Option<Vec<_>>>() else { continue };
             let sum_of_terms = terms.iter().map(|(at, by)| by * numbers[*at]).sum::<f64>();
             let (said, slope) =
                 if expectation.logarithm { (sum_of_terms.ln(), 1.0 / sum_of_terms) } else { (sum_of_terms, 1.0) };
             let off = said - expectation.value;
-            let held = self.rational_held
-                && !expectation.known
-                && expectation.terms.iter().any(|(number, _)| number.is_rational());
+            // k4, k5 and k6; and all terms beyond the five that nearly all lenses need.
+            let is_rational = |(number, _): &(Number, f64)| matches!(number, Number::Camera(_, 9..=11));
+            let is_of_richer_lens = |(number, _): &(Number, f64)| matches!(number, Number::Camera(_, 9..));
+            let held = self.rational_held && !expectation.known && expectation.terms.iter().any(is_rational);
             let sigma = if held { HELD * expectation.sigma } else { expectation.sigma };
-            let of_richer =
-                !expectation.known && expectation.terms.iter().all(|(number, _)| number.is_of_richer_lens());
+            let of_richer = !expectation.known && expectation.terms.iter().all(is_of_richer_lens);
             let weight = if of_richer { self.weight } else { 1.0 } / (sigma * sigma);
             sum.cost += 0.5 * weight * off * off;
             for (i, a) in &terms {
@@ -240,18 +233,6 @@ impl Priors {
             }
             Number::Shape(k) => layout.shape.then(|| layout.shape_start() + k),
         }
-    }
-}
-
-impl Number {
-    /// True for the terms beyond the five that nearly all lenses need.
-    fn is_of_richer_lens(self) -> bool {
-        matches!(self, Number::Camera(_, 9..))
-    }
-
-    /// True for k4, k5 and k6.
-    fn is_rational(self) -> bool {
-        matches!(self, Number::Camera(_, 9..=11))
     }
 }
 

@@ -3,7 +3,7 @@
 //! In: views that agree and values near their minimum. Out: the values at the minimum, how corners scatter, and what each weighs. Method: a robust search, then the likeliest scatter of the corners, whose tails follow from the data, together with weak
 //! expectations of what lenses and boards are like ([`crate::stereo::solve::priors`]).
 
-use nalgebra::{Matrix2, Vector2};
+use nalgebra::{DMatrix, Matrix2, Vector2};
 
 use crate::stereo::Error;
 use crate::stereo::data::residuals;
@@ -12,7 +12,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search, Solution, Stop};
 use crate::stereo::solve::uncertainty::{self, UNTOLD_FOCAL_SIGMA, worst_focal_sigma};
-use crate::stereo::solve::{Equations, Loss, Priors, Uncertainty};
+use crate::stereo::solve::{Equations, Loss, Priors};
 
 /// Rounds of fitting the scatter and solving again.
 const MOST_ROUNDS: usize = 12;
@@ -20,9 +20,7 @@ const MOST_ROUNDS: usize = 12;
 /// Views that agree, with values to start from.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Problem {
-    /// The pairs.
     pub views: Vec<View>,
-    /// Values of all unknowns.
     pub values: Values,
     /// What is expected of cameras and board before any picture.
     pub priors: Priors,
@@ -33,7 +31,6 @@ pub struct Problem {
 pub struct Solved {
     /// Views with whitened corners, and the values reached.
     pub problem: Problem,
-    /// How corners scatter.
     pub noise: Noise,
     /// Gaussian, or with heavy tails; the whiteners hold the weights that it gives.
     pub loss: Loss,
@@ -161,13 +158,13 @@ impl Solved {
         self.problem.neighbours().inflation() * self.loss_factor
     }
 
-    /// Covariance of everything; an error where the views do not tell.
-    pub fn uncertainty(&self, layout: &Layout) -> Result<Uncertainty, Error> {
+    /// Covariance of the shared numbers; an error where the views do not tell.
+    pub fn covariance(&self, layout: &Layout) -> Result<DMatrix<f64>, Error> {
         let equations = self.problem.equations(layout).ok_or_else(Error::undetermined)?;
-        let uncertainty = uncertainty::of_equations(&equations).ok_or_else(Error::undetermined)?;
-        let worst = worst_focal_sigma(&uncertainty.shared, layout, &self.shared().rig);
+        let covariance = uncertainty::covariance(&equations).ok_or_else(Error::undetermined)?;
+        let worst = worst_focal_sigma(&covariance, layout, &self.shared().rig);
         let known = worst <= UNTOLD_FOCAL_SIGMA;
-        if known { Ok(uncertainty) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
+        if known { Ok(covariance) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
     }
 
     /// The normal equations with the loss's own curvature: along its residual a corner's gradient changes by less than its weight.
@@ -194,7 +191,6 @@ impl Solved {
         earlier.map_or(1.0, |earlier| (px(earlier) / px(&self.noise)).powi(2).max(1.0))
     }
 
-    /// The shared values.
     pub fn shared(&self) -> &Shared {
         &self.problem.values.shared
     }

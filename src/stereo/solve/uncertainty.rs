@@ -1,9 +1,9 @@
 //! What the normal equations at a minimum say about uncertainty: covariances, and whether the views determine the cameras.
 //!
-//! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers and of each pose, with unit variance of the
-//! whitened residuals. Goes wrong: numbers that the views do not determine; then there is no covariance.
+//! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers, with unit variance of the whitened residuals. Goes wrong:
+//! numbers that the views do not determine; then there is no covariance.
 
-use nalgebra::{DMatrix, DMatrixViewMut, Matrix6};
+use nalgebra::{DMatrix, DMatrixViewMut};
 use rayon::prelude::*;
 
 use crate::linear_algebra::to_unit_diagonal;
@@ -26,56 +26,9 @@ pub fn expected_decrease(equations: &Equations) -> Option<f64> {
     Some(of_poses + gradient.dot(&(invert(&matrix)? * &gradient)))
 }
 
-/// Covariance of the shared numbers and of each pose (its own block), with unit variance of the whitened residuals.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Uncertainty {
-    /// Of the shared numbers, in the layout's order.
-    pub shared: DMatrix<f64>,
-    /// Of each pose: rotation (rad), then translation (mm); the share of the shared numbers included.
-    pub poses: Vec<Matrix6<f64>>,
-}
-
-impl Uncertainty {
-    /// All covariances times a factor.
-    pub fn scaled(mut self, factor: f64) -> Uncertainty {
-        self.shared *= factor;
-        self.poses.iter_mut().for_each(|pose| *pose *= factor);
-        self
-    }
-
-    /// With another covariance of the shared numbers; what changes reaches the poses through the normal equations of their pairs.
-    pub fn with_shared(mut self, shared: DMatrix<f64>, blocks: &[Block]) -> Uncertainty {
-        let change = &shared - &self.shared;
-        for (pose, block) in self.poses.iter_mut().zip(blocks) {
-            let Some(inverse) = block.pose_inverse(0.0) else { continue };
-            *pose += of_pose(block, &inverse, &change);
-        }
-        self.shared = shared;
-        self
-    }
-}
-
-/// What a covariance of the shared numbers adds to that of a pose, which is `inverse` by its own corners.
-fn of_pose(block: &Block, inverse: &Matrix6<f64>, shared: &DMatrix<f64>) -> Matrix6<f64> {
-    let through = inverse * block.mixed.transpose();
-    let spread = &through * shared * through.transpose();
-    Matrix6::from_fn(|i, j| spread[(i, j)])
-}
-
-/// Covariance at a minimum, from the equations there. `None` where the views do not determine the unknowns.
-pub fn of_equations(equations: &Equations) -> Option<Uncertainty> {
-    let count = equations.count();
-    let shared =
-        if count == 0 { DMatrix::zeros(0, 0) } else { invert(&normal_equations::eliminate(equations, 0.0)?.0)? };
-    let poses = equations
-        .blocks
-        .iter()
-        .map(|block| {
-            let inverse = block.pose_inverse(0.0)?;
-            Some(inverse + of_pose(block, &inverse, &shared))
-        })
-        .collect::<Option<Vec<_>>>()?;
-    Some(Uncertainty { shared, poses })
+/// Covariance of the shared numbers at a minimum, from the equations there. `None` where the views do not determine them.
+pub fn covariance(equations: &Equations) -> Option<DMatrix<f64>> {
+    invert(&normal_equations::eliminate(equations, 0.0)?.0)
 }
 
 /// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to rounding.

@@ -29,7 +29,6 @@ fn a_twisted_board_is_seen_and_corrected() {
         assert!(found.layout.shape, "a twist of {twist_mm} mm was not noticed");
         let worst = worst_point_mm(&found, &world);
         let [kx, ky, kxy] = found.values.shared.shape_mm;
-        println!("twist {twist_mm} mm found as {kx:.4} {ky:.4} {kxy:.4}, worst point {worst:.4} mm");
         assert!(
             (kxy - twist_mm).abs() < 0.005 && kx.abs().max(ky.abs()) < 0.01 && worst < 0.015,
             "{kx} {ky} {kxy} {worst}"
@@ -69,7 +68,6 @@ fn the_papers_rig_measures_to_two_micrometres() {
     let found = calibrate(&world.corners(42), &Options::default()).unwrap();
     let accuracy = held_out::hold_out(&found, None).unwrap();
     let to_70 = accuracy.ranges.iter().filter(|r| r.nominal_mm <= 70.0).map(|r| r.max_abs_error_mm).fold(0.0, f64::max);
-    println!("held out up to 70 mm {to_70:.5} mm, points {:.5} mm, {:?}", worst_point_mm(&found, &world), found.layout);
     // Corners of 0.005 px scatter by 0.4 um across and 1 um in depth; the worst of 60 000 lengths lies at five sigmas.
     assert!(to_70 < 0.006, "{to_70}");
     assert!(worst_point_mm(&found, &world) < 0.005);
@@ -81,7 +79,6 @@ fn a_board_bowed_by_50_micrometres_costs_little_once_its_shape_is_free() {
     let found = calibrate(&world.corners(44), &Options::default()).unwrap();
     let flat = calibrate(&world.corners(44), &Options { shape: Some(false), ..Options::default() }).unwrap();
     let (bowed, flat) = (worst_point_mm(&found, &world), worst_point_mm(&flat, &world));
-    println!("worst point with the shape free {bowed:.5} mm, taken as flat {flat:.5} mm");
     assert!(found.layout.shape && bowed < 0.015 && flat > bowed, "{bowed} {flat}");
 }
 
@@ -92,7 +89,6 @@ fn a_lens_term_of_half_a_pixel_is_found_by_the_ladder() {
     let corners = world.corners(46);
     let found = calibrate(&corners, &Options::default()).unwrap();
     let lens = found.layout.left.unwrap();
-    println!("{lens:?}, worst point {:.5} mm", worst_point_mm(&found, &world));
     assert!(lens >= Lens::Brown5 && worst_point_mm(&found, &world) < 0.015, "{lens:?}");
     let forced = calibrate(&corners, &BROWN4).unwrap();
     assert!(!crate::stereo::judge::residual_correlation::check(&forced).white(), "{:?}", forced.neighbours);

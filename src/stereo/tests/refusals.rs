@@ -138,7 +138,7 @@ fn three_pairs_are_too_few() {
 fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
     // Side by side and square to the board, so that neither camera sees it from the side.
     let refused = calibrate(&World::facing(8, |i| Vector3::z() * 0.1 * i).corners(1), &Options::default());
-    let told = |c: Calibration| (c.rig().left.fx, c.uncertainty.shared[(0, 0)].sqrt(), c.layout);
+    let told = |c: Calibration| (c.rig().left.fx, c.covariance[(0, 0)].sqrt(), c.layout);
     assert!(matches!(refused, Err(Error::Undetermined { .. })), "{:?}", refused.map(told));
 }
 
@@ -194,8 +194,7 @@ fn few_boards_that_lie_alike_are_calibrated_and_nothing_is_promised() {
     let all = ["00", "01", "02", "03", "04"];
     let mut unchecked = 0;
     for sigma_px in [0.25, 0.5, 1.0, 2.0] {
-        let world = World::facing(5, |i| Vector3::new(0.02 * (i - 2.0), 0.03, 0.1 * i));
-        let world = World { sigma_px, ..world };
+        let world = World { sigma_px, ..World::facing(5, |i| Vector3::new(0.02 * (i - 2.0), 0.03, 0.1 * i)) };
         let Ok(found) = calibrate(&world.corners(1), &BROWN4) else { continue };
         let Ok(accuracy) = held_out::hold_out(&found, None) else { continue };
         if accuracy.unchecked == all {

@@ -56,7 +56,7 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
         assert!((neighbours.inflation() - 1.9).abs() < 0.25, "{neighbours:?}");
         assert!(crate::stereo::judge::residual_correlation::check(&found).white());
         for (i, off) in deviations(&found, &exact).iter().enumerate() {
-            let variance = found.uncertainty.shared[(i, i)];
+            let variance = found.covariance[(i, i)];
             squares += off * off / variance;
             predicted += 1.0;
         }

@@ -96,13 +96,11 @@ impl VolumeLength {
     }
 }
 
-/// Lengths through the volume.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VolumeLengths {
     pub volume: Volume,
     /// What it was asked for as.
     pub extent: Extent,
-    /// How long they are, mm.
     pub length_mm: f64,
     /// Those whose ends lie in the volume, as the boards lay in it.
     pub lengths: Vec<VolumeLength>,
@@ -203,14 +201,12 @@ fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
 /// The rows' and the columns' directions of boards with the least and the most of these tilts, deg: about x, then about y.
 fn directions_of_tilts([x_least, x_most, y_least, y_most]: [f64; 4]) -> Vec<Vector3<f64>> {
     let tilts = [(x_least, y_least), (x_least, y_most), (x_most, y_least), (x_most, y_most)];
-    tilts
-        .into_iter()
-        .flat_map(|(x, y)| {
-            let normal = Vector3::new(y.to_radians().tan(), x.to_radians().tan(), 1.0).normalize();
-            let row = (Vector3::x() - normal * normal.x).normalize();
-            [row, normal.cross(&row)]
-        })
-        .collect()
+    let directions = |(x, y): (f64, f64)| {
+        let normal = Vector3::new(y.to_radians().tan(), x.to_radians().tan(), 1.0).normalize();
+        let row = (Vector3::x() - normal * normal.x).normalize();
+        [row, normal.cross(&row)]
+    };
+    tilts.into_iter().flat_map(directions).collect()
 }
 
 /// Refuses a box of which both cameras see nothing.
@@ -226,11 +222,8 @@ pub fn check(calibration: &Calibration, extent: Extent) -> Result<(), Error> {
 
 /// A lattice through the box in the left camera's frame that the boards' corners filled, or that is asked for.
 fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
-    let points = calibration
-        .views
-        .iter()
-        .zip(&calibration.values.poses)
-        .flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
+    let pairs = calibration.views.iter().zip(&calibration.values.poses);
+    let points = pairs.flat_map(|(view, pose)| view.active(Side::Left).map(move |o| (pose * o.board_mm).coords));
     lattice(match extent {
         Extent::Box([x0, y0, z0, x1, y1, z1]) => [Vector3::new(x0, y0, z0), Vector3::new(x1, y1, z1)],
         _ => bounds(points),
@@ -239,17 +232,13 @@ fn places(calibration: &Calibration, extent: Extent) -> Vec<Point3<f64>> {
 
 /// Places through a box, from its lowest to its highest corner.
 fn lattice([low, high]: [Vector3<f64>; 2]) -> Vec<Point3<f64>> {
+    let [nx, ny, nz] = PLACES;
     let share = |i: usize, of: usize| i as f64 / (of - 1) as f64;
-    let mut places = Vec::new();
-    for iz in 0..PLACES[2] {
-        for iy in 0..PLACES[1] {
-            for ix in 0..PLACES[0] {
-                let shares = Vector3::new(share(ix, PLACES[0]), share(iy, PLACES[1]), share(iz, PLACES[2]));
-                places.push(Point3::from(low + (high - low).component_mul(&shares)));
-            }
-        }
-    }
-    places
+    let place = |k: usize| {
+        let shares = Vector3::new(share(k % nx, nx), share(k / nx % ny, ny), share(k / (nx * ny), nz));
+        Point3::from(low + (high - low).component_mul(&shares))
+    };
+    (0..nx * ny * nz).map(place).collect()
 }
 
 fn length(

@@ -81,7 +81,9 @@ impl Volume {
         Volume {
             left_px: seen(Side::Left),
             right_px: seen(Side::Right),
-            depth_mm: depths_mm(values, views),
+            depth_mm: range(views.iter().zip(&values.poses).flat_map(|(view, pose)| {
+                view.active(Side::Left).map(move |o| (pose * o.board_point(&values.shared.shape_mm)).z)
+            })),
             tilt_deg: tilts_deg(values),
         }
     }
@@ -120,13 +122,6 @@ impl Volume {
         let (left, right) = rig.project(at);
         self.left_px.contains(&left) && self.right_px.contains(&right)
     }
-}
-
-/// Nearest and farthest corner of the boards along the left camera's axis, mm.
-fn depths_mm(values: &Values, views: &[View]) -> [f64; 2] {
-    range(views.iter().zip(&values.poses).flat_map(|(view, pose)| {
-        view.active(Side::Left).map(move |o| (pose * o.board_point(&values.shared.shape_mm)).z)
-    }))
 }
 
 /// Tilts of the boards in the left camera's frame, deg: about x the least and the most, about y the same.

@@ -89,7 +89,7 @@ fn at_bound(found: &Calibration, known: &KnownLenses, noise: Noise) -> Option<Ca
     let equations = problem.equations(&found.layout)?;
     let typical = found.noise.typical_px(&found.views);
     let mut bound = found.clone();
-    let matrix = uncertainty::of_equations(&equations)?.shared * (noise.sigma_px / typical).powi(2);
+    let matrix = uncertainty::covariance(&equations)? * (noise.sigma_px / typical).powi(2);
     bound.values.shared.rig.covariance = Some(Covariance { order: found.layout.names(), matrix });
     Some(bound)
 }

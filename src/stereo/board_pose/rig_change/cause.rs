@@ -37,7 +37,6 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// All that are tried.
     pub const ALL: [Cause; 10] = [
         Cause::Turn(0),
         Cause::Turn(1),
@@ -111,11 +110,9 @@ impl Cause {
 /// How a cause would explain what is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Explanation {
-    /// What.
     pub cause: Cause,
     /// By how much: rad, mm, or a share.
     pub amount: f64,
-    /// Standard deviation of that.
     pub sigma: f64,
     /// By how much chi-square falls with it.
     pub fall: f64,
@@ -124,7 +121,6 @@ pub struct Explanation {
 }
 
 impl Explanation {
-    /// In words.
     pub fn describe(&self, rig: &Rig, board: &Board) -> String {
         let words = self.cause.describe(self.amount, rig, board);
         if self.grows { format!("{words}, little by little from the first pose to the last") } else { words }
@@ -133,14 +129,12 @@ impl Explanation {
 
 /// Every cause at the common minimum, by its score.
 pub(in crate::stereo::board_pose) fn explanations(found: &Estimate<'_>) -> Vec<Explanation> {
-    let rig = found.bundle.rig_at(&found.values);
-    Cause::ALL
-        .into_iter()
-        .filter_map(|cause| match cause.direction(&rig) {
-            Some(direction) => of_rig(found, cause, &direction),
-            None => of_pitch(found),
-        })
-        .collect()
+    let rig = found.bundle.rig.rig_at(&found.values.rig);
+    let explanation = |cause: Cause| match cause.direction(&rig) {
+        Some(direction) => of_rig(found, cause, &direction),
+        None => of_pitch(found),
+    };
+    Cause::ALL.into_iter().filter_map(explanation).collect()
 }
 
 fn of_rig(found: &Estimate<'_>, cause: Cause, direction: &DVector<f64>) -> Option<Explanation> {
@@ -220,13 +214,9 @@ pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
 /// the left camera's axis points is a word of its lens: with an open tilt of the sensor or an open picture centre, all points turn together, and
 /// nothing that is measured between them does.
 pub(in crate::stereo::board_pose) fn shifts_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> Vec<Option<Vector3<f64>>> {
-    let points: Vec<_> = a
-        .values
-        .poses
-        .iter()
-        .zip(&b.values.poses)
-        .map(|(a, b)| Some((a.as_ref()?.translation.vector, b.as_ref()?.translation.vector)))
-        .collect();
+    let both = a.values.poses.iter().zip(&b.values.poses);
+    let points: Vec<_> =
+        both.map(|(a, b)| Some((a.as_ref()?.translation.vector, b.as_ref()?.translation.vector))).collect();
     let together = points.iter().flatten().map(|(a, b)| a * b.transpose()).sum();
     let a_from_b = nearest_rotation(&together);
     points.iter().map(|both| both.map(|(a, b)| a_from_b * b - a)).collect()

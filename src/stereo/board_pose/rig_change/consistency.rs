@@ -25,7 +25,6 @@ pub const NUMBERS: f64 = 6.0;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
     pub change: Vector6<f64>,
-    /// Fall of chi-square.
     pub fall: f64,
 }
 

@@ -16,7 +16,6 @@ pub enum Flip {
 impl Flip {
     pub const ALL: [Flip; 3] = [Flip::Mirrored, Flip::UpsideDown, Flip::HalfTurn];
 
-    /// In words.
     pub fn describe(self) -> &'static str {
         match self {
             Flip::Mirrored => "mirrored, left for right",

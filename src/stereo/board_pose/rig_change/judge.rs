@@ -59,15 +59,16 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
         return (found, None);
     }
     let some = subset(&found);
-    let mut fitted: Vec<(f64, Explanation)> = scores
-        .iter()
-        .filter(|e| e.fall >= COMPETES * best)
-        .filter_map(|score| {
-            let fit = with_cause(&some, score, f64::INFINITY, usual)?;
-            let amount = amount_of(&fit, score.cause)?;
-            Some((deviance(&fit), Explanation { amount, ..*score }))
-        })
-        .collect();
+    let fit = |score: &Explanation| {
+        let fit = with_cause(&some, score, f64::INFINITY, usual)?;
+        let amount = match score.cause {
+            Cause::Pitch => stretch(&fit)[0],
+            _ => *fit.values.rig.as_slice().last()?,
+        };
+        Some((deviance(&fit), Explanation { amount, ..*score }))
+    };
+    let mut fitted: Vec<(f64, Explanation)> =
+        scores.iter().filter(|e| e.fall >= COMPETES * best).filter_map(fit).collect();
     fitted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(&(least, first)) = fitted.first() else { return (found, None) };
     let equals = fitted.iter().filter(|(d, _)| d - least <= AS_LIKELY).map(|(_, e)| *e).collect();
@@ -142,7 +143,7 @@ fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usua
     let mut values = found.values.clone();
     // From the rig that was calibrated: what a fit without the cause made of the rig is far off where a lens leaves much open.
     values.rig.fill(0.0);
-    match cause.cause.direction(&bundle.rig_at(&values)) {
+    match cause.cause.direction(&bundle.rig.rig_at(&values.rig)) {
         Some(direction) => {
             bundle.rig = bundle.rig.with_change(&direction, variance);
             let n = values.rig.len();
@@ -153,14 +154,6 @@ fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usua
         }
     }
     estimate(bundle, values, usual, Some(found.excess))
-}
-
-/// How much of a cause a fit with it found.
-fn amount_of(fit: &Estimate<'_>, cause: Cause) -> Option<f64> {
-    match cause {
-        Cause::Pitch => Some(stretch(fit)[0]),
-        _ => fit.values.rig.as_slice().last().copied(),
-    }
 }
 
 /// Minus twice the logarithm of the likelihood, but for a constant: corners and what was known before.

@@ -7,7 +7,6 @@ use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::Changed;
 
-/// What is found of the rig as a whole.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum Judgement {
     /// It agrees with its calibration.
@@ -29,7 +28,6 @@ pub enum Judgement {
         creeps: bool,
         /// By how much the right camera turned, deg, and how far it went, mm, in all.
         turned_deg: f64,
-        /// See above.
         moved_mm: f64,
     },
     /// It is another from pose to pose.
@@ -108,7 +106,6 @@ impl Judgement {
         })
     }
 
-    /// What to do about it.
     pub fn hint(&self, rig: &Rig) -> Option<&'static str> {
         match self {
             Judgement::Agrees | Judgement::Allowed(_) => None,

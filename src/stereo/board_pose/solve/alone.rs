@@ -1,6 +1,6 @@
 //! One pose with everything shared held: the poses that the bundle did without, and the figures of those that it had.
 
-use nalgebra::{DMatrix, Vector2};
+use nalgebra::Vector2;
 
 use crate::geometry::{Transform, perturb};
 use crate::stereo::board_pose::solve::bundle::Promise;
@@ -21,10 +21,7 @@ const ROUNDS: usize = 3;
 /// The shared values as a pose sees them.
 pub struct Known<'a> {
     scene: Scene<'a>,
-    basis: &'a DMatrix<f64>,
-    inflation: f64,
-    /// See [`Estimate::excess`].
-    excess: f64,
+    found: &'a Estimate<'a>,
 }
 
 pub struct Alone {
@@ -36,7 +33,6 @@ pub struct Alone {
     pub part: Eliminated,
     /// Chi-square of the active corners over its degrees of freedom.
     pub chi_square: f64,
-    /// Degrees of freedom.
     pub freedom: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
@@ -45,14 +41,8 @@ pub struct Alone {
 }
 
 impl<'a> Known<'a> {
-    /// The values of an estimate.
     pub fn new(found: &'a Estimate<'_>) -> Known<'a> {
-        Known {
-            scene: found.bundle.scene(&found.values),
-            basis: &found.bundle.rig.basis,
-            inflation: found.inflation,
-            excess: found.excess,
-        }
+        Known { scene: found.bundle.scene(&found.values), found }
     }
 
     /// Fits a pose. The whiteners are the estimate's. `None` where the corners do not determine it or most of them are outliers.
@@ -61,25 +51,23 @@ impl<'a> Known<'a> {
         view.observations.iter_mut().for_each(|o| o.active = true);
         let mut pose = self.search(&view, *start, Loss::Cauchy, Promise::ROUGH)?;
         for _ in 0..ROUNDS {
-            let miss = |o: &Observation| Some(o.whiten(self.scene.residual(&pose, o)?).norm() * self.inflation.sqrt());
-            leave_outliers_out(&mut view, miss, self.excess);
+            let miss =
+                |o: &Observation| Some(o.whiten(self.scene.residual(&pose, o)?).norm() * self.found.inflation.sqrt());
+            leave_outliers_out(&mut view, miss, self.found.excess);
             if !enough(&view) {
                 return None;
             }
             pose = self.search(&view, pose, Loss::Squared, Promise::RESULT)?;
         }
-        let part = PoseBlock::of(&self.scene, &pose, &view, Loss::Squared)?.eliminate(self.basis)?;
-        let active: Vec<(&Observation, Vector2<f64>)> = view
-            .observations
-            .iter()
-            .filter(|o| o.active)
-            .filter_map(|o| Some((o, self.scene.residual(&pose, o)?)))
-            .collect();
+        let part = PoseBlock::of(&self.scene, &pose, &view, Loss::Squared)?.eliminate(&self.found.bundle.rig.basis)?;
+        let active = view.observations.iter().filter(|o| o.active);
+        let active: Vec<(&Observation, Vector2<f64>)> =
+            active.filter_map(|o| Some((o, self.scene.residual(&pose, o)?))).collect();
         let freedom = 2.0 * active.len() as f64 - 6.0;
         let sum: f64 = active.iter().map(|(o, r)| o.whiten(*r).norm_squared()).sum();
         Some(Alone {
             part,
-            chi_square: sum * self.inflation / freedom.max(1.0),
+            chi_square: sum * self.found.inflation / freedom.max(1.0),
             freedom,
             rms_px: root_mean_square(active.iter().map(|(_, r)| r.norm_squared()))?,
             fit_rms_mm: fit_rms_mm(&self.scene, &view, &pose),

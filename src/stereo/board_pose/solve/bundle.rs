@@ -9,14 +9,12 @@ use rayon::prelude::*;
 
 use crate::geometry::{Transform, perturb};
 use crate::imaging::Board;
-use crate::stereo::Rig;
 use crate::stereo::board_pose::solve::pose_block::{Eliminated, PoseBlock, Scene};
 use crate::stereo::board_pose::solve::prior::{RigPrior, ShapePrior, weights};
 use crate::stereo::board_pose::solve::totals::Totals;
 use crate::stereo::data::View;
 use crate::stereo::solve::Loss;
 use crate::stereo::solve::normal_equations::{inverse6, solve_scaled};
-use crate::stereo::solve::uncertainty::invert;
 
 /// Steps of one search at most; each squares what is left.
 const STEPS: usize = 12;
@@ -49,7 +47,6 @@ pub struct Values {
 pub struct Bundle<'a> {
     /// The target as drawn.
     pub board: &'a Board,
-    /// Every pose's corners.
     pub views: Vec<View>,
     /// The calibration.
     pub rig: RigPrior,
@@ -77,14 +74,9 @@ impl<'a> Bundle<'a> {
         DVector::from_iterator(values.rig.len() + 3 * values.deviations_mm.len(), all)
     }
 
-    /// The rig at these values.
-    pub fn rig_at(&self, values: &Values) -> Rig {
-        self.rig.rig_at(&values.rig)
-    }
-
     /// The rig and the target at these values.
     pub fn scene(&self, values: &Values) -> Scene<'a> {
-        Scene::new(self.rig_at(values), self.board, &values.deviations_mm)
+        Scene::new(self.rig.rig_at(&values.rig), self.board, &values.deviations_mm)
     }
 
     /// Linearises. `None` where a corner would lie behind its camera or no pose takes part.
@@ -154,22 +146,16 @@ impl Values {
     /// A share of a step.
     fn moved(&self, step: &DVector<f64>, normal: &Normal, share: f64) -> Values {
         let n = self.rig.len();
-        let deviations = self.deviations_mm.iter().enumerate();
+        let deviation = |(k, d): (usize, &Vector3<f64>)| d + Vector3::from_fn(|i, _| share * step[n + 3 * k + i]);
+        let pose = |(pose, part): (&Option<Transform>, &Option<Eliminated>)| {
+            let (pose, part) = (pose.as_ref()?, part.as_ref()?);
+            let shared = part.by_shared() * step;
+            Some(perturb(pose, ((part.step() + shared) * share).as_slice()))
+        };
         Values {
             rig: &self.rig + step.rows(0, n) * share,
-            deviations_mm: deviations
-                .map(|(k, d)| d + Vector3::from_iterator((0..3).map(|i| share * step[n + 3 * k + i])))
-                .collect(),
-            poses: self
-                .poses
-                .iter()
-                .zip(&normal.poses)
-                .map(|(pose, part)| {
-                    let (pose, part) = (pose.as_ref()?, part.as_ref()?);
-                    let shared = part.by_shared() * step;
-                    Some(perturb(pose, ((part.step() + shared) * share).as_slice()))
-                })
-                .collect(),
+            deviations_mm: self.deviations_mm.iter().enumerate().map(deviation).collect(),
+            poses: self.poses.iter().zip(&normal.poses).map(pose).collect(),
         }
     }
 }
@@ -185,10 +171,5 @@ impl Normal {
         });
         let promise = -0.5 * gradient.dot(&step) + own.sum::<f64>();
         Some((step, promise))
-    }
-
-    /// Covariance of the shared unknowns.
-    pub fn covariance(&self) -> Option<DMatrix<f64>> {
-        invert(&(&self.told.matrix + &self.weights))
     }
 }

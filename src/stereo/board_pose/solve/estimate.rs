@@ -54,7 +54,6 @@ pub struct Estimate<'a> {
     pub normal: Normal,
     /// Covariance of the shared unknowns.
     pub covariance: DMatrix<f64>,
-    /// How corners scatter.
     pub noise: Noise,
     /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a variance.
     pub excess: f64,
@@ -117,7 +116,7 @@ pub fn estimate<'a>(
         let by = 1.0 / (inflation * excess).sqrt();
         bundle.views.iter_mut().flat_map(|view| &mut view.observations).for_each(|o| o.whitener *= by);
         (values, normal) = bundle.solve(values, Loss::Squared, Promise::RESULT)?;
-        covariance = normal.covariance()?;
+        covariance = invert(&(&normal.told.matrix + &normal.weights))?;
         let before = (noise, bundle.shape.in_plane_mm, bundle.shape.out_of_plane_mm, excess);
         if known_excess.is_none() {
             excess = (excess * usual_excess(&at_each(&normal, &covariance)))

@@ -41,7 +41,6 @@ impl<'a> Scene<'a> {
         Scene { rig, board, crossings }
     }
 
-    /// The crossing of a corner.
     pub fn crossing(&self, o: &Observation) -> Point3<f64> {
         self.crossings[self.board.index(o.col, o.row)]
     }
@@ -78,6 +77,7 @@ pub struct PoseBlock {
 }
 
 /// The part of the pose alone.
+#[derive(Default)]
 pub struct PoseSums {
     matrix: Matrix6<f64>,
     gradient: Vector6<f64>,
@@ -136,13 +136,9 @@ struct Row {
 }
 
 impl PoseSums {
-    fn zeros() -> PoseSums {
-        PoseSums { matrix: Matrix6::zeros(), gradient: Vector6::zeros(), cost: 0.0 }
-    }
-
     /// The sums at these values, without those of a [`PoseBlock`]. `None` where a corner would lie behind its camera.
     pub fn of(scene: &Scene<'_>, left_from_board: &Transform, view: &View, loss: Loss) -> Option<PoseSums> {
-        let mut sums = PoseSums::zeros();
+        let mut sums = PoseSums::default();
         scene.each_corner(left_from_board, view, |_, _, rows| {
             let weight = sums.weigh(rows, loss);
             rows.iter().for_each(|row| sums.add(row, weight));
@@ -180,7 +176,7 @@ impl PoseBlock {
             shared: CornerSums::zeros(scene.crossings.len()),
             rig_pose: SMatrix::zeros(),
             crossings_pose: vec![Matrix3x6::zeros(); scene.crossings.len()],
-            pose: PoseSums::zeros(),
+            pose: PoseSums::default(),
         };
         scene.each_corner(left_from_board, view, |side, at, rows| {
             let weight = block.pose.weigh(rows, loss);
@@ -221,11 +217,6 @@ impl PoseBlock {
             crossing.gradient[j] += by * row.residual;
             (0..3).for_each(|i| crossing.own[(i, j)] += by * row.crossing[i]);
         }
-    }
-
-    /// What the corners say of their crossings' places in the plane: the trace of the normal matrix there.
-    pub fn told_in_plane(&self) -> f64 {
-        self.shared.crossings.iter().map(|c| c.own[(0, 0)] + c.own[(1, 1)]).sum()
     }
 
     /// With the pose eliminated, in the coordinates of the shared unknowns: `basis` maps the first of them to the rig's numbers, the

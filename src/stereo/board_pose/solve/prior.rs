@@ -7,13 +7,10 @@
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
-use crate::geometry::perturb;
 use crate::imaging::Board;
 use crate::stereo::Rig;
-use crate::stereo::board_pose::solve::pose_block::TRANSFORM;
-use crate::stereo::model::board_shape::{self, lift};
-use crate::stereo::model::projection::CAMERA_NUMBERS;
-use crate::stereo::model::{Covariance, Layout};
+use crate::stereo::model::board_shape::{self, FLAT, lift};
+use crate::stereo::model::{Covariance, Layout, Shared};
 use crate::stereo::triangulate::{RIG_NUMBERS, rig_number};
 
 /// How tightly the deviations are held free of shift, turn and tilt, as a multiple of what the corners say about them.
@@ -71,15 +68,9 @@ impl RigPrior {
         prior
     }
 
-    /// The rig at these unknowns.
     pub fn rig_at(&self, unknowns: &DVector<f64>) -> Rig {
-        let step = &self.basis * unknowns;
-        let mut rig = self.rig.clone();
-        for (camera, start) in [(&mut rig.left, 0), (&mut rig.right, CAMERA_NUMBERS)] {
-            camera.add(&step.as_slice()[start..]);
-        }
-        rig.right_from_left = perturb(&rig.right_from_left, &step.as_slice()[TRANSFORM..]);
-        rig
+        let calibrated = Shared { rig: self.rig.clone(), shape_mm: FLAT };
+        Layout::WHOLE_RIG.step(&calibrated, (&self.basis * unknowns).as_slice()).rig
     }
 }
 

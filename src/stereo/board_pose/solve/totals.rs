@@ -33,7 +33,6 @@ pub struct Totals {
     pub rig: DMatrix<f64>,
     /// The rig's raw numbers by the shared unknowns.
     pub rig_shared: DMatrix<f64>,
-    /// Gradient of the rig's raw numbers.
     pub rig_gradient: DVector<f64>,
 }
 
@@ -70,7 +69,6 @@ impl Totals {
 }
 
 impl<'a> SharedSums<'a> {
-    /// No pose yet.
     fn new(basis: &'a DMatrix<f64>, crossings: usize) -> SharedSums<'a> {
         let size = RIG_NUMBERS + basis.ncols() + 3 * crossings;
         SharedSums {

@@ -25,7 +25,6 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// The window of a corner.
     pub fn of(board: &'a Board, o: &Observation) -> Window<'a> {
         Window { board, place: (o.col, o.row), reach: o.reach }
     }

@@ -19,9 +19,7 @@ pub struct Facts {
     pub tolerance_mm: f64,
     /// The pairs from which the lenses were known beforehand.
     pub lens_pairs: LensPairs,
-    /// How uncertainties are expanded.
     pub expansion: Expansion,
-    /// Held-out accuracy.
     pub accuracy: Accuracy,
     /// What checks the scale.
     pub standards: Standards,
@@ -33,7 +31,6 @@ pub struct Facts {
     pub volume: VolumeLengths,
     /// What happened to the rig while it was photographed.
     pub findings: Vec<Finding>,
-    /// How the boards are spread.
     pub coverage: Coverage,
 }
 
@@ -70,7 +67,6 @@ pub struct Standards {
     pub moves: KnownMoves,
 }
 
-/// What a line of the ledger is made of.
 pub struct Case<'a> {
     pub calibration: &'a Calibration,
     pub facts: &'a Facts,
@@ -87,6 +83,19 @@ impl Evidence {
     ) -> Evidence {
         let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), case.facts.tolerance_mm);
         Evidence { what, remedy, value: value_mm, limit: Some(case.facts.tolerance_mm), unit: "mm", allows, detail }
+    }
+
+    /// A figure beside its limit, which casts doubt on a rig where it is not kept.
+    pub(super) fn of_doubt(
+        what: &'static str,
+        remedy: &'static str,
+        [value, limit]: [f64; 2],
+        unit: &'static str,
+        is_kept: bool,
+        detail: String,
+    ) -> Evidence {
+        let allows = if is_kept { Verdict::Pass } else { Verdict::Undecided };
+        Evidence { what, remedy, value: Some(value), limit: Some(limit), unit, allows, detail }
     }
 }
 

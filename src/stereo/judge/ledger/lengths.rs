@@ -6,7 +6,7 @@ use crate::diagnostic::{summed, two_digits};
 use crate::statistics::median;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
-use crate::stereo::judge::lengths::model_disagreement::{self};
+use crate::stereo::judge::lengths::model_disagreement;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::volume::Extent;
 
@@ -14,13 +14,9 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     let extremes = &case.facts.accuracy.extremes;
     let worst = &extremes.largest;
     let doubtful = &case.facts.accuracy.doubtful;
-    let left_out = if doubtful.lengths_left_out > 0 {
-        format!(
-            "; {} lengths that end in doubtful corners are not counted (see the check of rays)",
-            doubtful.lengths_left_out
-        )
-    } else {
-        String::new()
+    let left_out = match doubtful.lengths_left_out {
+        0 => String::new(),
+        n => format!("; {n} lengths that end in doubtful corners are not counted (see the check of rays)"),
     };
     let board_mm = worst.expansion.board_mm.unwrap_or_default();
     // What is left of the tolerance beside an uncertain board decides nothing about pictures.
@@ -31,23 +27,17 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
         "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
          or the `--tolerance-mm` that your robot needs"
     };
-    Evidence {
-        what: "held-out lengths",
-        remedy,
-        value: Some(worst.at_most_mm()),
-        limit: Some(case.facts.tolerance_mm),
-        unit: "mm",
-        allows: extremes.verdict(case.facts.tolerance_mm),
-        detail: format!(
-            "{} of all lengths between corners of pairs that the rig had not seen, {} folds: {}. The limit is the tolerance. The largest error of \
-             any length is {} mm, one length in twenty is off by more than {} mm{left_out}",
-            LARGEST_SUM,
-            case.facts.accuracy.folds,
-            as_added(worst),
-            two_digits(extremes.max_abs_error_mm),
-            two_digits(extremes.one_in_twenty_mm)
-        ),
-    }
+    let detail = format!(
+        "{} of all lengths between corners of pairs that the rig had not seen, {} folds: {}. The limit is the tolerance. The largest error of \
+         any length is {} mm, one length in twenty is off by more than {} mm{left_out}",
+        LARGEST_SUM,
+        case.facts.accuracy.folds,
+        as_added(worst),
+        two_digits(extremes.max_abs_error_mm),
+        two_digits(extremes.one_in_twenty_mm)
+    );
+    let line = Evidence::of_length("held-out lengths", remedy, Some(worst.at_most_mm()), case, detail);
+    Evidence { allows: extremes.verdict(case.facts.tolerance_mm), ..line }
 }
 
 /// What is compared with the tolerance.
@@ -68,15 +58,10 @@ pub const TOLERANCE: &str = "tolerance";
 /// A tolerance that no rig can miss whose corners were counted rightly: an error of half a square puts a corner nearer to another one.
 pub(super) fn tolerance(case: &Case) -> Option<Evidence> {
     let (tolerance_mm, half_mm) = (case.facts.tolerance_mm, 0.5 * case.calibration.board.square_mm);
-    (tolerance_mm >= half_mm).then(|| Evidence {
-        what: TOLERANCE,
-        remedy: "`--tolerance-mm` and `--square-mm` are in mm: see that both are",
-        value: Some(tolerance_mm),
-        limit: Some(half_mm),
-        unit: "mm asked for",
-        allows: Verdict::Undecided,
-        detail: "as wide as half a square of the board or wider: any rig would be within it".to_owned(),
-    })
+    let remedy = "`--tolerance-mm` and `--square-mm` are in mm: see that both are";
+    let detail = "as wide as half a square of the board or wider: any rig would be within it".to_owned();
+    let figures = [tolerance_mm, half_mm];
+    (tolerance_mm >= half_mm).then(|| Evidence::of_doubt(TOLERANCE, remedy, figures, "mm asked for", false, detail))
 }
 
 pub(super) fn any_length(case: &Case) -> Evidence {
@@ -187,14 +172,9 @@ pub(super) fn folds(case: &Case) -> Evidence {
     let changes = case.facts.accuracy.fold_steps.iter().map(|step| case.facts.volume.most_changed_mm(layout, step));
     let value = changes.fold(0.0, f64::max);
     let unchecked = &case.facts.accuracy.unchecked;
-    let alone = if unchecked.is_empty() {
-        String::new()
-    } else {
-        format!(
-            ". Without {} the others do not determine the cameras: nothing checks what it says",
-            unchecked.join(", ")
-        )
-    };
+    let names = unchecked.join(", ");
+    let alone = format!(". Without {names} the others do not determine the cameras: nothing checks what it says");
+    let alone = if unchecked.is_empty() { String::new() } else { alone };
     let detail = format!(
         "largest change of a length of {:.0} mm anywhere in the working volume when a block of similar pairs is left out; a rig that depends on one block has the errors of that block{alone}",
         case.facts.volume.length_mm
@@ -217,19 +197,13 @@ pub(super) fn rays(case: &Case) -> Evidence {
     let doubtful = &case.facts.accuracy.doubtful;
     let value = 100.0 * doubtful.contradicted_share();
     let named = if doubtful.pairs.is_empty() { String::new() } else { format!(", in {}", doubtful.named()) };
-    Evidence {
-        what: RAYS,
-        remedy: "look at the corners of the pairs that the page names, for a hand, glare or shadow",
-        value: Some(value),
-        limit: Some(LIMIT_PERCENT),
-        unit: "%",
-        allows: Verdict::within(value, LIMIT_PERCENT),
-        detail: format!(
-            "{} of {} held-out corners have rays that miss each other by more than {CONTRADICTED} standard deviations and {} were \
-             measured far worse than usual{named}; a few are a hand or a reflection, more are an error of the rig",
-            doubtful.contradicted, doubtful.corners, doubtful.unsure
-        ),
-    }
+    let remedy = "look at the corners of the pairs that the page names, for a hand, glare or shadow";
+    let detail = format!(
+        "{} of {} held-out corners have rays that miss each other by more than {CONTRADICTED} standard deviations and {} were \
+         measured far worse than usual{named}; a few are a hand or a reflection, more are an error of the rig",
+        doubtful.contradicted, doubtful.corners, doubtful.unsure
+    );
+    Evidence::of_doubt(RAYS, remedy, [value, LIMIT_PERCENT], "%", value <= LIMIT_PERCENT, detail)
 }
 
 pub(super) fn epipolar(case: &Case) -> Evidence {
@@ -255,15 +229,10 @@ pub(super) fn epipolar(case: &Case) -> Evidence {
 }
 
 pub(super) fn second_board(case: &Case) -> Evidence {
-    let line = |value, allows, detail| Evidence {
-        what: "second board",
-        remedy: "check `--check-squares` and `--check-square-mm`, and that the rig has not moved between the two boards",
-        value,
-        limit: Some(case.facts.tolerance_mm),
-        unit: "mm",
-        allows,
-        detail,
-    };
+    let remedy =
+        "check `--check-squares` and `--check-square-mm`, and that the rig has not moved between the two boards";
+    let line =
+        |value, allows, detail| Evidence { allows, ..Evidence::of_length("second board", remedy, value, case, detail) };
     let Some(second) = &case.facts.standards.second else {
         let detail = "not asked for: the scale of every length is the pitch of the board, and an error of its pitch does not show here. `--check-images DIR` names pictures of a second board, `--known-move MM` a slide of a known length";
         return Evidence { limit: None, ..line(None, Verdict::Pass, detail.to_owned()) };

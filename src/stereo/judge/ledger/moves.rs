@@ -19,15 +19,8 @@ pub(super) fn known_moves(case: &Case) -> Vec<Evidence> {
         [Cause::KnownMove] => "look up what the moves were: one of them at least is not as stated",
         _ => "state a move of another length as well: it tells a wrong side of the squares from a wrong move",
     };
-    let line = |value, allows, detail| Evidence {
-        what: KNOWN_MOVE,
-        remedy,
-        value,
-        limit: Some(case.facts.tolerance_mm),
-        unit: "mm",
-        allows,
-        detail,
-    };
+    let line =
+        |value, allows, detail| Evidence { allows, ..Evidence::of_length(KNOWN_MOVE, remedy, value, case, detail) };
     let length_mm = case.facts.volume.length_mm;
     let of_move = |known: &KnownMove| known.verdict(length_mm, case.facts.tolerance_mm);
     let is_confirmed = told.is_empty() && moves.measured.iter().any(|known| of_move(known) == Verdict::Pass);

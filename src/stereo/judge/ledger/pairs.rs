@@ -65,31 +65,21 @@ pub(super) fn pair_scatter(case: &Case) -> Evidence {
 }
 
 /// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
-fn contradicting<'a>(case: &'a Case) -> Vec<&'a str> {
-    let all = case.calibration.discarded.pairs.iter();
-    all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect()
-}
-
 pub(super) fn pairs_discarded(case: &Case) -> Evidence {
     /// Up to a third single pairs are wrong; beyond it what was kept may be the wrong choice.
     const LIMIT_PERCENT: f64 = 34.0;
-    let contradicting = contradicting(case);
+    let all = case.calibration.discarded.pairs.iter();
+    let contradicting: Vec<&str> = all.filter(|p| p.cause.contradicts()).map(|p| p.pair.as_str()).collect();
     let judged = case.calibration.views.len() + contradicting.len();
     let value = 100.0 * contradicting.len() as f64 / judged.max(1) as f64;
     let named: Vec<&str> = contradicting.iter().take(5).copied().collect();
     let named = if named.is_empty() { String::new() } else { format!(" ({})", named.join(", ")) };
-    Evidence {
-        what: "pairs discarded",
-        remedy: "see why each is not used, and take those again",
-        value: Some(value),
-        limit: Some(LIMIT_PERCENT),
-        unit: "%",
-        allows: Verdict::within(value, LIMIT_PERCENT),
-        detail: format!(
-            "{} of {judged} pairs with corners do not fit the common rig{named}; beyond the limit the rig may have changed",
-            contradicting.len()
-        ),
-    }
+    let remedy = "see why each is not used, and take those again";
+    let detail = format!(
+        "{} of {judged} pairs with corners do not fit the common rig{named}; beyond the limit the rig may have changed",
+        contradicting.len()
+    );
+    Evidence::of_doubt("pairs discarded", remedy, [value, LIMIT_PERCENT], "%", value <= LIMIT_PERCENT, detail)
 }
 
 /// Whether the rig that was calibrated is the one that stands now.
@@ -112,15 +102,8 @@ pub(super) fn standing(case: &Case) -> Evidence {
             after.join(", ")
         )
     };
-    Evidence {
-        what: "last pairs that contradict the rig",
-        remedy: "add pairs of the rig as it stands",
-        value: Some(after.len() as f64),
-        limit: Some(0.0),
-        unit: "",
-        allows: if after.is_empty() { Verdict::Pass } else { Verdict::Undecided },
-        detail,
-    }
+    let (what, remedy) = ("last pairs that contradict the rig", "add pairs of the rig as it stands");
+    Evidence::of_doubt(what, remedy, [after.len() as f64, 0.0], "", after.is_empty(), detail)
 }
 
 pub(super) fn poses(case: &Case) -> Evidence {
@@ -130,19 +113,13 @@ pub(super) fn poses(case: &Case) -> Evidence {
     const FEWEST_OF_KNOWN: f64 = 3.0;
     let fewest = if case.calibration.lenses_are_known() { FEWEST_OF_KNOWN } else { FEWEST };
     let groups = case.calibration.pair_scatter.groups as f64;
-    Evidence {
-        what: "pairs with poses of their own",
-        remedy: "add pairs with the board elsewhere and tilted otherwise",
-        value: Some(groups),
-        limit: Some(fewest),
-        unit: "",
-        allows: if groups >= fewest { Verdict::Pass } else { Verdict::Undecided },
-        detail: format!(
-            "{} pairs were used. Few pairs cannot show one that is wrong by a little, a rig that drifts, or a lens that differs at the \
-             border: with fewer than {fewest:.0} different poses each held-out pair is judged by too few others",
-            case.facts.coverage.pairs
-        ),
-    }
+    let remedy = "add pairs with the board elsewhere and tilted otherwise";
+    let detail = format!(
+        "{} pairs were used. Few pairs cannot show one that is wrong by a little, a rig that drifts, or a lens that differs at the \
+         border: with fewer than {fewest:.0} different poses each held-out pair is judged by too few others",
+        case.facts.coverage.pairs
+    );
+    Evidence::of_doubt("pairs with poses of their own", remedy, [groups, fewest], "", groups >= fewest, detail)
 }
 
 pub(super) fn tilts(case: &Case) -> Evidence {
@@ -150,23 +127,14 @@ pub(super) fn tilts(case: &Case) -> Evidence {
     const LEAST_DEG: f64 = 5.0;
     let [horizontal, vertical] = case.facts.coverage.tilts_deg;
     let value = horizontal.max(vertical);
-    Evidence {
-        what: "tilts of the boards",
-        remedy: "add pairs tilted by 20 to 45 degrees",
-        value: Some(value),
-        limit: Some(LEAST_DEG),
-        unit: "deg",
-        allows: if value >= LEAST_DEG || case.calibration.lenses_are_known() {
-            Verdict::Pass
-        } else {
-            Verdict::Undecided
-        },
-        detail: format!(
-            "range of the boards' tilts, {horizontal:.0} degrees about the horizontal and {vertical:.0} about the vertical axis; boards \
-             that are all parallel do not tell the focal length from the distance, and lengths on them come out right even where tilted \
-             ones are wrong"
-        ),
-    }
+    let detail = format!(
+        "range of the boards' tilts, {horizontal:.0} degrees about the horizontal and {vertical:.0} about the vertical axis; boards \
+         that are all parallel do not tell the focal length from the distance, and lengths on them come out right even where tilted \
+         ones are wrong"
+    );
+    let (what, remedy) = ("tilts of the boards", "add pairs tilted by 20 to 45 degrees");
+    let is_kept = value >= LEAST_DEG || case.calibration.lenses_are_known();
+    Evidence::of_doubt(what, remedy, [value, LEAST_DEG], "deg", is_kept, detail)
 }
 
 /// A focal length that the pictures hardly tell, or that is none of a lens; lengths elsewhere than where the boards were are then anybody's guess.
@@ -174,22 +142,15 @@ pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
     /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses that see wider than this
     /// are calibrated with others.
     const WIDEST_DEG: f64 = 150.0;
-    let Calibration { uncertainty, layout, .. } = case.calibration;
+    let Calibration { covariance, layout, .. } = case.calibration;
     let rig = case.calibration.rig();
-    let undecided = |value, limit, unit, detail| Evidence {
-        what: "focal lengths",
-        remedy: "add pairs tilted by 20 to 45 degrees about both axes, at several distances",
-        value: Some(value),
-        limit: Some(limit),
-        unit,
-        allows: Verdict::Undecided,
-        detail,
-    };
-    let worst = worst_focal_sigma(&uncertainty.shared, layout, rig);
+    let remedy = "add pairs tilted by 20 to 45 degrees about both axes, at several distances";
+    let undecided = |figures, unit, detail| Evidence::of_doubt("focal lengths", remedy, figures, unit, false, detail);
+    let worst = worst_focal_sigma(covariance, layout, rig);
     if worst > WORST_FOCAL_SIGMA {
         let detail = "standard deviation of the focal length that the pictures tell least: boards that all lie alike do not tell it from \
                       their distance";
-        return Some(undecided(100.0 * worst, 100.0 * WORST_FOCAL_SIGMA, "%", detail.to_owned()));
+        return Some(undecided([100.0 * worst, 100.0 * WORST_FOCAL_SIGMA], "%", detail.to_owned()));
     }
     let seen_deg = |camera: &Camera| {
         let corner = (f64::from(camera.width) / camera.fx).hypot(f64::from(camera.height) / camera.fy);
@@ -202,7 +163,7 @@ pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
             "what a camera sees from corner to corner if its focal lengths are the {fx:.1} and {fy:.1} px that fit best: no lens of these \
              models does; boards that all lie alike, or that are not as flat as they are taken to be, do not tell a focal length"
         );
-        undecided(seen, WIDEST_DEG, "deg", detail)
+        undecided([seen, WIDEST_DEG], "deg", detail)
     })
 }
 
@@ -211,31 +172,21 @@ pub(super) fn baseline(case: &Case) -> Option<Evidence> {
     /// Endoscopes have 4 mm.
     const LEAST_MM: f64 = 3.0;
     let baseline_mm = case.calibration.rig().baseline_mm();
-    (baseline_mm < LEAST_MM).then(|| Evidence {
-        what: "distance of the cameras",
-        remedy: "check `--square-mm`: it is in mm, and an inch is 25.4",
-        value: Some(baseline_mm),
-        limit: Some(LEAST_MM),
-        unit: "mm apart",
-        allows: Verdict::Undecided,
-        detail:
-            "cameras are wider than that: the side of the board's squares is in other units, and all lengths with it"
-                .to_owned(),
-    })
+    let (what, remedy) = ("distance of the cameras", "check `--square-mm`: it is in mm, and an inch is 25.4");
+    let detail =
+        "cameras are wider than that: the side of the board's squares is in other units, and all lengths with it";
+    let figures = [baseline_mm, LEAST_MM];
+    (baseline_mm < LEAST_MM).then(|| Evidence::of_doubt(what, remedy, figures, "mm apart", false, detail.to_owned()))
 }
 
 /// Lenses that were known from some of these very pairs: what those tell counts twice, and the uncertainty is too small.
 pub(super) fn lenses_of_these_pairs(case: &Case) -> Option<Evidence> {
     let pairs = case.facts.lens_pairs;
-    pairs.statement().filter(|_| pairs.are_many()).map(|detail| Evidence {
-        what: "lenses known from other pairs",
-        remedy: "leave `--intrinsics` away, or give it a calibration from other pictures",
-        value: Some(pairs.same as f64),
-        limit: Some(0.5 * pairs.of as f64),
-        unit: "pairs that are the same",
-        allows: Verdict::Undecided,
-        detail,
-    })
+    let what = "lenses known from other pairs";
+    let remedy = "leave `--intrinsics` away, or give it a calibration from other pictures";
+    let figures = [pairs.same as f64, 0.5 * pairs.of as f64];
+    let line = |detail| Evidence::of_doubt(what, remedy, figures, "pairs that are the same", false, detail);
+    pairs.statement().filter(|_| pairs.are_many()).map(line)
 }
 
 /// Name of the line on lenses that were known beforehand.
@@ -248,21 +199,15 @@ pub(super) fn known_lenses(case: &Case) -> Option<Evidence> {
         .into_iter()
         .filter_map(|side| Some(format!("{} {} %", side.name(), two_digits(100.0 * check.focus_seen[side as usize]?))))
         .collect();
-    Some(Evidence {
-        what: KNOWN_LENSES,
-        remedy: check.remedy(),
-        value: Some(check.chi_square),
-        limit: Some(check.limit),
-        unit: "",
-        allows: if check.contradicts() { Verdict::Undecided } else { Verdict::Pass },
-        detail: format!(
-            "{}: squared difference of {} known numbers from what the pictures give by themselves, in units of its covariance. Nineteen of \
-             twenty such tests see a focal length that differs by {}",
-            check.statement,
-            check.numbers,
-            seen.join(", ")
-        ),
-    })
+    let detail = format!(
+        "{}: squared difference of {} known numbers from what the pictures give by themselves, in units of its covariance. Nineteen of \
+         twenty such tests see a focal length that differs by {}",
+        check.statement,
+        check.numbers,
+        seen.join(", ")
+    );
+    let figures = [check.chi_square, check.limit];
+    Some(Evidence::of_doubt(KNOWN_LENSES, check.remedy(), figures, "", !check.contradicts(), detail))
 }
 
 /// Depth and field: what lies beyond is extrapolated; within, the uncertainty of lengths says what it costs.

@@ -27,7 +27,6 @@ const SHORT_SQUARES: usize = 1;
 /// One pair as measured by cameras that have not seen it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeldOutPair {
-    /// Its name.
     pub pair: String,
     /// Mean error of the short range along x, mm; `None` where no such length was seen.
     #[serde(rename = "mean_error_x10_mm")]
@@ -50,19 +49,15 @@ pub struct HeldOutPair {
     pub long_errors_mm: Vec<f64>,
 }
 
-/// The accuracy of a rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accuracy {
-    /// The length errors that decide.
     pub extremes: Extremes,
     /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures disagree as
     /// much as the corners scatter, less where both see the same deviations from the board.
     pub rays_chi_square: f64,
     /// Distance of corners from the epipolar lines of their partners.
     pub epipolar: EpipolarError,
-    /// Corners that say less than the others.
     pub doubtful: DoubtfulCorners,
-    /// Number of folds.
     pub folds: usize,
     /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually are
     /// helped to.
@@ -75,7 +70,6 @@ pub struct Accuracy {
     pub long_mm: [f64; 2],
     /// Every range, x first, from the shortest.
     pub ranges: Vec<Range>,
-    /// Every pair.
     pub pairs: Vec<HeldOutPair>,
 }
 
@@ -90,9 +84,7 @@ impl Accuracy {
 /// Distance of corners from the epipolar lines of their partners.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct EpipolarError {
-    /// Root mean square, px.
     pub rms_px: f64,
-    /// Largest, px.
     pub max_px: f64,
 }
 
@@ -130,14 +122,9 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
     }
     check_baseline(calibration)?;
     let folds = folds(calibration).ok_or_else(undetermined)?;
-    let mut measured: Vec<Measured> = calibration
-        .views
-        .par_iter()
-        .enumerate()
-        .map(|(i, view)| {
-            folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view))
-        })
-        .collect();
+    let measured =
+        |(i, view)| folds.of(i).map_or_else(Measured::default, |fold| measure(&fold.rig, &calibration.board, view));
+    let mut measured: Vec<Measured> = calibration.views.par_iter().enumerate().map(measured).collect();
     let names: Vec<&str> = calibration.views.iter().map(|view| view.pair.as_str()).collect();
     let usual_px = calibration.noise.typical_px(&calibration.views);
     let doubtful = doubtful_corners::leave_out(&mut measured, &names, usual_px);
@@ -149,21 +136,21 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
 fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     /// Standard deviations by which the distance must be more than nothing.
     const FEWEST: f64 = 3.0;
-    let Calibration { layout, uncertainty, .. } = calibration;
+    let Calibration { layout, covariance, .. } = calibration;
     let between_mm = calibration.rig().right_from_left.translation.vector;
     let at = layout.transform_start() + 3;
     let direction = between_mm.try_normalize(0.0).unwrap_or_else(Vector3::x);
     let sigma_mm = |covariance: &DMatrix<f64>, at: usize| {
         (direction.transpose() * covariance.fixed_view::<3, 3>(at, at) * direction).x.max(0.0).sqrt()
     };
-    let (baseline_mm, sigma_of_both_mm) = (between_mm.norm(), sigma_mm(&uncertainty.shared, at));
+    let (baseline_mm, sigma_of_both_mm) = (between_mm.norm(), sigma_mm(covariance, at));
     if baseline_mm >= FEWEST * sigma_of_both_mm {
         return Ok(());
     }
     let (first, rest) = (layout.transform_start(), layout.count() - layout.transform_start());
-    let lenses_known = uncertainty::invert(&uncertainty.shared)
+    let lenses_known = uncertainty::invert(covariance)
         .and_then(|told| uncertainty::invert(&told.view((first, first), (rest, rest)).into_owned()));
-    let focal_sigma = uncertainty::worst_focal_sigma(&uncertainty.shared, layout, calibration.rig());
+    let focal_sigma = uncertainty::worst_focal_sigma(covariance, layout, calibration.rig());
     if focal_sigma > WORST_FOCAL_SIGMA
         && lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3))
     {
@@ -184,8 +171,8 @@ fn folds(calibration: &Calibration) -> Option<Folds> {
         without = within(UNTOLD_FOCAL_SIGMA);
     }
     let inflation = calibration.inflation;
-    let by_noise = uncertainty::of_equations(&equations)?.shared * inflation;
-    let more = &calibration.uncertainty.shared - by_noise;
+    let by_noise = uncertainty::covariance(&equations)? * inflation;
+    let more = &calibration.covariance - by_noise;
     let covariance = |w: &Without| {
         let matrix = &w.covariance * inflation + &more;
         RigCovariance::new(&Covariance { order: layout.names(), matrix })

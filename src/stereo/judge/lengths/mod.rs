@@ -20,25 +20,20 @@ use crate::stereo::triangulate::{RigCovariance, SpacePoint, common, triangulate}
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axis {
-    /// Along x.
     X,
-    /// Along y.
     Y,
 }
 
 /// The errors of one range over all pairs; measured minus nominal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Range {
-    /// Direction on the board.
     pub axis: Axis,
-    /// Nominal length, mm.
     pub nominal_mm: f64,
     /// How many lengths.
     pub count: usize,
     pub mean_error_mm: f64,
     /// Standard deviation of the errors, mm.
     pub std_mm: f64,
-    /// Largest absolute error, mm.
     pub max_abs_error_mm: f64,
 }
 

@@ -61,11 +61,8 @@ fn compare(calibration: &Calibration, volume: &VolumeLengths, witness: &Witness)
 /// The findings for a person, where there are any: the one that changes lengths most, and the names of the others.
 pub fn describe(all: &[Disagreement]) -> Option<String> {
     let worst = all.iter().max_by(|a, b| a.length_change_mm.total_cmp(&b.length_change_mm))?;
-    let others: Vec<String> = all
-        .iter()
-        .filter(|d| *d != worst)
-        .map(|d| format!("{} ({} mm)", d.name(), two_digits(d.length_change_mm)))
-        .collect();
+    let named = |d: &Disagreement| format!("{} ({} mm)", d.name(), two_digits(d.length_change_mm));
+    let others: Vec<String> = all.iter().filter(|d| *d != worst).map(named).collect();
     let and = if others.is_empty() { String::new() } else { format!(". So does {}", others.join(", ")) };
     Some(worst.describe() + &and)
 }

@@ -21,15 +21,12 @@ use crate::stereo::triangulate::RigCovariance;
 pub struct SecondBoard {
     /// Pairs that were measured.
     pub pairs: usize,
-    /// Pairs that were not, and why.
     pub pairs_skipped: Vec<Skipped>,
     /// The length errors that decide; `None` where no length could be measured.
     #[serde(skip)]
     pub extremes: Option<Extremes>,
-    /// Corners that say less than the others.
     #[serde(skip)]
     pub doubtful: DoubtfulCorners,
-    /// Largest absolute error of a length, mm.
     pub max_abs_error_mm: Option<f64>,
     /// Measured lengths over nominal ones, minus one; both boards' pitch errors and the rig's scale together.
     pub scale_error: Option<f64>,

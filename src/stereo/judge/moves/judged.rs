@@ -17,13 +17,10 @@ const CONTRADICTS: f64 = 2.5758;
 pub struct KnownMove {
     /// The pairs before and after it.
     pub pairs: [String; 2],
-    /// As stated, mm.
     pub stated_mm: f64,
     /// Expanded uncertainty (k = 2) of that, mm.
     pub stated_uncertainty_mm: f64,
-    /// As the rig measures it, mm.
     pub measured_mm: f64,
-    /// Standard deviation of that, mm.
     pub measured_sigma_mm: f64,
     /// By how much the board turned, deg.
     pub turn_deg: f64,
@@ -42,7 +39,6 @@ pub struct KnownMove {
 /// The moves that were asked for.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct KnownMoves {
-    /// Those that were measured.
     pub measured: Vec<KnownMove>,
     /// Why others were not.
     pub missing: Vec<String>,

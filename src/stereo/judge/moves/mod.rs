@@ -48,7 +48,11 @@ pub fn measure(calibration: &Calibration, stated: &[StatedMove]) -> Result<Known
     let mut moves = KnownMoves::default();
     let mut all: Vec<[usize; 2]> = Vec::new();
     for stated in stated {
-        match pairs(&places, stated)? {
+        let ends = match &stated.between {
+            Some(names) => named(&places, stated, names)?,
+            None => Ok(by_look(&places, stated)?),
+        };
+        match ends {
             Ok(ends) => {
                 if all.contains(&ends) || all.contains(&[ends[1], ends[0]]) {
                     return Err(Error::MoveTwice { pairs: places.names(ends) });
@@ -62,15 +66,7 @@ pub fn measure(calibration: &Calibration, stated: &[StatedMove]) -> Result<Known
     Ok(moves)
 }
 
-/// The pairs before and after a move, or, in the inner result, why one of them says nothing. Where they are not named, the only two pairs in a
-/// row between which the board moved by such a length without turning.
-fn pairs(places: &Places, stated: &StatedMove) -> Result<Result<[usize; 2], String>, Error> {
-    match &stated.between {
-        Some(names) => named(places, stated, names),
-        None => by_look(places, stated).map(Ok),
-    }
-}
-
+/// The pairs of these names before and after a move, or, in the inner result, why one of them says nothing.
 fn named(places: &Places, stated: &StatedMove, names: &[String; 2]) -> Result<Result<[usize; 2], String>, Error> {
     let calibration = places.calibration;
     let mut ends = [0; 2];
@@ -101,6 +97,7 @@ fn named(places: &Places, stated: &StatedMove, names: &[String; 2]) -> Result<Re
     Ok(Ok(ends))
 }
 
+/// The only two pairs in a row between which the board moved by such a length without turning.
 fn by_look(places: &Places, stated: &StatedMove) -> Result<[usize; 2], Error> {
     let length_mm = stated.length_mm;
     let misfit = |slide: &Slide| (slide.length_mm - length_mm).abs().max(slide.half_range_mm()) / length_mm;

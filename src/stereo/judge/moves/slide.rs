@@ -31,7 +31,6 @@ pub(super) struct Slide {
     pub length_mm: f64,
     /// Standard deviation of that through the corners of both pairs and the rig, mm.
     pub sigma_mm: f64,
-    /// How far it turned, rad.
     pub turn_rad: f64,
     /// Whether that is more than chance.
     pub is_turned: bool,
@@ -54,7 +53,6 @@ impl<'a> Places<'a> {
         Some(Places { calibration, places, widened })
     }
 
-    /// The pairs' names.
     pub fn names(&self, ends: [usize; 2]) -> [String; 2] {
         ends.map(|i| self.calibration.views[i].pair.clone())
     }
@@ -68,7 +66,7 @@ impl<'a> Places<'a> {
         let turn = rotation.scaled_axis();
         let [a, b] = ends.map(|i| &self.places[i]);
         let through = &b.through - &a.through;
-        let by_rig = &through * &self.calibration.uncertainty.shared * through.transpose() * self.widened.powi(2);
+        let by_rig = &through * &self.calibration.covariance * through.transpose() * self.widened.powi(2);
         let covariance = a.own + b.own + Matrix6::from_fn(|i, j| by_rig[(i, j)]);
         let part = |at| covariance.fixed_view::<3, 3>(at, at).into_owned();
         let [of_turn, of_shift]: [SMatrix<f64, 3, 3>; 2] = [part(0), part(3)];

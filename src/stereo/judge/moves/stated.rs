@@ -5,13 +5,11 @@ use std::str::FromStr;
 /// Expanded uncertainty (k = 2) of a move that comes without one, mm: a gauge block against a stop.
 pub const UNCERTAINTY_MM: f64 = 0.002;
 
-/// The longest move, mm.
 const LONGEST_MM: f64 = 10_000.0;
 
 /// A slide of the board by a known length.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StatedMove {
-    /// How far, mm.
     pub length_mm: f64,
     /// Expanded uncertainty (k = 2) of that, mm.
     pub uncertainty_mm: f64,
