@@ -43,6 +43,11 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
 }
 
+/// How many directions a normal matrix determines.
+pub fn rank(normal: &DMatrix<f64>) -> usize {
+    (pseudo_inverse(normal.clone()) * normal).trace().round() as usize
+}
+
 /// Unknowns eliminated from a normal matrix: they are at their best for any values of those that are kept.
 #[derive(Debug, Clone)]
 pub struct Eliminated {

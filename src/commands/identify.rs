@@ -100,7 +100,7 @@ fn search(
     if settings.method.is_none() && (unexplained || several_robots) {
         let one = Settings { method: Some(Method::TrustRegion), ..settings.clone() };
         let found = identify(set, nominal, &one, seed, &step)?;
-        if several_robots || !record::findings::is_explained(&found) {
+        if several_robots || !record::findings::is_explained(set, &found) {
             let not_run = "only trust-region was run: the other methods search the same neighbourhood of the robot file, and what speaks against \
                            the result would stay; `--method stapso` runs one of them all the same";
             return Ok(Searched { found, not_run: Some(not_run.to_owned()) });

@@ -5,6 +5,7 @@ pub mod errors;
 pub mod folds;
 pub mod lengths;
 pub mod locate;
+pub mod pattern;
 pub mod placement;
 pub mod recheck;
 pub mod scale;

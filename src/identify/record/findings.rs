@@ -1,5 +1,7 @@
 //! What was found along the way, each in words with the rows it is about and what was done.
 
+use nalgebra::Vector3;
+
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::still::{constant_joints, repeated};
@@ -7,6 +9,7 @@ use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
+use crate::identify::judge::pattern;
 use crate::identify::record::file::Smooth;
 use crate::identify::record::{left_out, plausible, rounded};
 use crate::identify::run::Identification;
@@ -14,6 +17,9 @@ use crate::identify::sensor::Extra;
 
 /// Times the scatter that no built robot has after a fit, from which on it speaks against the result whatever seemed to explain it before.
 const FAR_BEYOND: f64 = 3.0;
+
+/// How many times smaller than what lies between the points their scatter must be.
+const SMALL: f64 = 10.0;
 
 /// What is wrong with the data, by weight.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -42,9 +48,10 @@ impl Findings {
             return Findings { against, doubts: examined, notes: Vec::new() };
         }
         let left_mm = found.scatter.point_mm;
-        let beyond_all =
-            || (left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM).then(|| conventions::unexplained(left_mm));
-        let unexplained = unexplained.filter(|_| !is_explained(found)).or_else(beyond_all);
+        let noise = of_noise(set, found);
+        let far_beyond_mm = FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
+        let beyond_all = || (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained(left_mm));
+        let unexplained = unexplained.filter(|_| !is_explained(set, found)).or_else(beyond_all);
         let is_reached = unexplained.is_none();
         let errors = |set: &Dataset| {
             let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
@@ -63,7 +70,8 @@ impl Findings {
         let is_told = |finding: &Finding| {
             against.iter().any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
         };
-        let notes = of_fit.into_iter().filter(|finding| !is_told(finding)).collect();
+        let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
+        let notes = noise.into_iter().chain(of_fit).filter(|finding| !is_told(finding)).collect();
         // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
         // says nothing.
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
@@ -77,6 +85,7 @@ impl Findings {
             .chain(of_verify(set, found))
             .chain(scale)
             .chain(terms)
+            .chain(far_beyond)
             .collect();
         Findings { against, doubts, notes }
     }
@@ -87,10 +96,41 @@ impl Findings {
     }
 }
 
-/// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it.
-pub fn is_explained(found: &Identification) -> bool {
-    let few_left_out = found.outliers.len() * 10 <= found.fitted.len();
-    found.formulation().is_some() && few_left_out && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
+/// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it, or leaves
+/// nothing but the readings' scatter.
+pub fn is_explained(set: &Dataset, found: &Identification) -> bool {
+    few_left_out(found) && (found.scatter.point_mm < conventions::IMPLAUSIBLE_MM || of_noise(set, found).is_some())
+}
+
+fn few_left_out(found: &Identification) -> bool {
+    found.formulation().is_some() && found.outliers.len() * 10 <= found.fitted.len()
+}
+
+/// Points that scatter by more than a robot could, where nothing of that follows the joints and the links are those of the file's robot. Rows that
+/// were exchanged scatter as well, by as much as the points lie apart.
+fn of_noise(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let scatter_mm = found.scatter.point_mm;
+    let may_be = scatter_mm >= conventions::IMPLAUSIBLE_MM && few_left_out(found);
+    let formulation = found.formulation().filter(|_| may_be)?;
+    let is_explained = SMALL * scatter_mm < spread_mm(set, &found.fitted);
+    (is_explained && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
+        Finding::new(
+            format!("the readings scatter by {scatter_mm:.2} mm a coordinate, whatever the joints are"),
+            "if the instrument is better than that, see whether the robot stood still and joints and readings are of one moment",
+        )
+    })
+}
+
+/// How far a coordinate of the points lies from the middle of its group, mm; zero of other readings.
+fn spread_mm(set: &Dataset, rows: &[usize]) -> f64 {
+    let of_group = |group| {
+        let points = set.of_group(rows, group).into_iter().filter_map(|row| set.poses[row].reading.point_mm());
+        let points: Vec<_> = points.map(|point| point.coords).collect();
+        let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
+        points.into_iter().map(move |point| (point - middle).norm_squared())
+    };
+    let squares: Vec<f64> = (0..set.groups.len()).flat_map(of_group).collect();
+    (squares.iter().sum::<f64>() / (3 * squares.len()).max(1) as f64).sqrt()
 }
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.

@@ -7,7 +7,7 @@ use crate::robot::{Parameter, Robot, Unit};
 
 /// Links that are farther from the file's than they are built.
 pub fn of_another_robot(found: &Identification) -> Option<Finding> {
-    let far = far(found, &link_limit)?;
+    let far = far(found, &link_limit, FAR_SIGMAS)?;
     Some(Finding::new(
         format!(
             "the links found are far from the nominal ones ({far}), farther than robots are built: the robot file may be of another robot"
@@ -16,9 +16,14 @@ pub fn of_another_robot(found: &Identification) -> Option<Finding> {
     ))
 }
 
+/// Whether no link is farther from the file's than robots are built, be it known well or badly.
+pub fn are_of_the_file(found: &Identification) -> bool {
+    far(found, &link_limit, 0.0).is_none()
+}
+
 /// Terms that are larger than those of built robots.
 pub fn of_terms(found: &Identification) -> Option<Finding> {
-    let far = far(found, &term_limit)?;
+    let far = far(found, &term_limit, FAR_SIGMAS)?;
     Some(Finding::new(
         format!(
             "terms found are implausibly large for gears, bearings and encoders ({far}): they may compensate another error, such as wrong \
@@ -72,8 +77,8 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
     }
 }
 
-/// The determined parameters whose correction is beyond its limit, for a sentence.
-fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Option<String> {
+/// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence.
+fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, sigmas: f64) -> Option<String> {
     let formulation = found.formulation()?;
     let (covariance, nominal) = (formulation.robot_covariance(), &formulation.rows.kinematics.nominal);
     let parameters = formulation.parameters();
@@ -91,7 +96,7 @@ fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Opti
         let variance = of(&|i| of(&|j| covariance[(i, j)]));
         let size = of(&|i| moved(parameters[i])).abs();
         limits.is_some_and(|limits| size > limits.iter().map(|l| l * l).sum::<f64>().sqrt())
-            && size > FAR_SIGMAS * variance.max(0.0).sqrt()
+            && size > sigmas * variance.max(0.0).sqrt()
     };
     let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
     let name = |sum: Vec<(usize, f64)>| {

@@ -326,7 +326,7 @@ fn diagnosed(sensor: Sensor, plant: Plant, size: f64, seed: u64) -> (Vec<Finding
         list.extend(unexplained);
         return (list, f64::INFINITY, None);
     };
-    list.extend(unexplained.filter(|_| !record::findings::is_explained(&found)));
+    list.extend(unexplained.filter(|_| !record::findings::is_explained(&set, &found)));
     list.extend(record::findings::findings(&set, &found, &along));
     let error = against_truth(&unspoilt, &truth, &found.candidates[found.chosen].robot);
     (list, error, found.scale(&set))

@@ -157,7 +157,7 @@ fn faults(runs: u64) {
             list.extend(examined.unexplained);
             return (list, f64::INFINITY);
         };
-        list.extend(examined.unexplained.filter(|_| !record::findings::is_explained(&found)));
+        list.extend(examined.unexplained.filter(|_| !record::findings::is_explained(&examined.set, &found)));
         list.extend(record::findings::findings(&examined.set, &found, &examined.along));
         (list, against_truth(&exact, &world.truth, &found.candidates[found.chosen].robot))
     };

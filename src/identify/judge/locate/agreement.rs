@@ -20,7 +20,7 @@ use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Raw, Scatter};
 use crate::identify::settings::Model;
 use crate::identify::solve::task::Task;
-use crate::linear_algebra::{product, pseudo_inverse};
+use crate::linear_algebra::{product, pseudo_inverse, rank};
 
 /// Chance that a robot that agrees is said to contradict the points.
 const FALSE_ALARM: f64 = 0.01;
@@ -85,7 +85,7 @@ pub fn agreement(task: &Task, robot_mm: f64, found: Misfit) -> Agreement {
     let geometry = task.robot.mdh_parameters();
     let task = Task { parameters: &geometry, extras: &[], model: Model::Position, ..*task };
     let rows = task.rows_at(Scatter::of_point(robot_mm), task.robot);
-    let (explained, _) = fitted(&rows, vec![0.0; geometry.len()], rank);
+    let (explained, _) = fitted(&rows, vec![0.0; geometry.len()], determined);
     let (left, of_geometry) = (explained.freedom as f64, freedom - explained.freedom as f64);
     let gain = (found.chi_square - explained.chi_square) / of_geometry / (explained.chi_square / left);
     let noise = FisherSnedecor::new(of_geometry, left).is_ok_and(|law| law.cdf(gain) < 1.0 - EXPLAINED);
@@ -101,10 +101,9 @@ pub fn agreement(task: &Task, robot_mm: f64, found: Misfit) -> Agreement {
 }
 
 /// How many directions of the unknowns the residuals determine.
-fn rank(rows: &Rows, at: &[f64]) -> usize {
+fn determined(rows: &Rows, at: &[f64]) -> usize {
     let (_, jacobian) = rows.evaluate(at, true);
-    let normal = product(&jacobian, &jacobian);
-    (pseudo_inverse(normal.clone()) * normal).trace().round() as usize
+    rank(&product(&jacobian, &jacobian))
 }
 
 /// The residuals that are left at the best offsets, from these on, and those offsets.
