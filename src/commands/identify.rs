@@ -77,7 +77,9 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     Ok(Outcome { stdout, status })
 }
 
-/// What was identified, and why not all methods were run. Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
+/// What was identified, and why not all methods were run.
+///
+/// Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
 /// same neighbourhood, for longer where there is nothing to find, and change nothing of the verdict. If the robot of that method explains rows
 /// that seemed to be unexplained, the others follow.
 fn search(
