@@ -80,6 +80,12 @@ pub fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
+/// A sentence with its first letter as a capital.
+pub fn capital(sentence: &str) -> String {
+    let mut chars = sentence.chars();
+    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
+}
+
 /// An error or an uncertainty as it is stated, with two significant digits: `0.0061`, `1.6`, `245`. Nothing finer than a nanometre (of mm) is told
 /// from zero; a value that is none is "n/a".
 pub fn two_digits(value: f64) -> String {
@@ -149,10 +155,9 @@ pub struct Warning {
 impl Warning {
     /// Text and reason.
     pub fn whole(&self) -> String {
-        let mut chars = self.reason.chars();
-        match chars.next() {
-            Some(first) => format!("{}. {}{}", self.text, first.to_uppercase(), chars.as_str()),
-            None => self.text.clone(),
+        match self.reason.is_empty() {
+            true => self.text.clone(),
+            false => format!("{}. {}", self.text, capital(&self.reason)),
         }
     }
 }

@@ -48,7 +48,6 @@ pub struct PrintBoard {
     /// Dots per inch of the PNG
     #[arg(long, default_value_t = 300.0, requires = "png", value_name = "DPI", value_parser = number)]
     pub dpi: f64,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }

@@ -54,7 +54,6 @@ pub struct CameraCheck {
     /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
     #[arg(required_unless_present = "corners", conflicts_with = "corners")]
     pub images: Option<Utf8PathBuf>,
-    /// How it is read.
     #[command(flatten)]
     pub pairs: Pairs,
     /// Corners from a CSV file instead of pictures
@@ -134,7 +133,6 @@ pub struct CameraCheck {
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]
     pub draw: bool,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
@@ -154,13 +152,11 @@ pub struct Measure {
     /// Folder with the pictures, as for camera-check, and poses.csv; or the left camera's, before RIGHT: poses.csv is then beside the
     /// two folders, or in one of them
     pub poses: Utf8PathBuf,
-    /// How it is read.
     #[command(flatten)]
     pub pairs: Pairs,
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// The target on the robot.
     #[command(flatten)]
     pub target: Target,
     /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
@@ -172,7 +168,6 @@ pub struct Measure {
     /// Draw the corners found over each pair, into overlays/ in the results folder
     #[arg(long)]
     pub draw: bool,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
@@ -182,7 +177,6 @@ pub struct Measure {
 pub struct Rectify {
     /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
     pub images: Utf8PathBuf,
-    /// How it is read.
     #[command(flatten)]
     pub pairs: Pairs,
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
@@ -209,20 +203,11 @@ pub struct Rectify {
     /// Filters of pictures that are raw colour mosaics: RGGB, BGGR, GRBG or GBRG
     #[arg(long, value_name = "PATTERN")]
     pub bayer: Option<Mosaic>,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
 
-/// `stereocal export`
-#[derive(Debug, Args)]
-pub struct Export {
-    /// What to write.
-    #[command(subcommand)]
-    pub what: ExportWhat,
-}
-
-/// What `export` can write.
+/// What `stereocal export` can write.
 #[derive(Debug, Subcommand)]
 pub enum ExportWhat {
     /// The stereo calibration
@@ -243,7 +228,6 @@ pub struct ExportCalibration {
     /// The rig, or the folder it was exported to [default: calibration.json in the results folder]
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
-    /// Where it goes.
     #[command(flatten)]
     pub files: Files,
 }

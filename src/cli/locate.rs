@@ -15,7 +15,6 @@ pub struct Locate {
     /// The robot, taken as it is: identified.toml, or a nominal one that is trusted
     #[arg(long, value_name = "FILE")]
     pub robot: Utf8PathBuf,
-    /// How a table is read.
     #[command(flatten)]
     pub table: TableFlags,
 }

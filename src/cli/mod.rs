@@ -14,15 +14,13 @@ use camino::Utf8PathBuf;
 use clap::{Args, Parser, Subcommand};
 
 pub use self::board::PrintBoard;
-pub use self::cameras::{
-    BoardShape, CalibrationFormat, CameraCheck, Export, ExportCalibration, ExportWhat, Measure, Rectify,
-};
+pub use self::cameras::{BoardShape, CalibrationFormat, CameraCheck, ExportCalibration, ExportWhat, Measure, Rectify};
 pub use self::locate::Locate;
 pub use self::output::{Files, Output};
 pub use self::placement::{ExportPlacement, PlacementFormat};
 pub use self::robot::{
-    Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotCommand, RobotFormat, RobotImport, RobotNew,
-    RobotPlace, RobotShow, RobotWhat, TableFlags, Verify,
+    Compensate, DhConvention, ExportRobot, Identify, Plan, PlanKind, RobotFormat, RobotImport, RobotNew, RobotPlace,
+    RobotShow, RobotWhat, TableFlags, Verify,
 };
 pub use self::simulate::{LensBlur, Preset, Simulate};
 pub use self::values::AskedSquares;
@@ -51,7 +49,6 @@ pub struct Cli {
     /// Leave program, date, command line and inputs out of the files
     #[arg(long, help_heading = "Global options", global = true)]
     pub no_provenance: bool,
-    /// What to do.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -100,9 +97,11 @@ pub enum Command {
     )]
     Compensate(Compensate),
     /// Write a calibration or a robot for other programs
-    Export(Export),
+    #[command(subcommand)]
+    Export(ExportWhat),
     /// Make a nominal robot file: from a URDF, a table, or a common arm's published numbers
-    Robot(RobotCommand),
+    #[command(subcommand)]
+    Robot(RobotWhat),
     /// Write a commented stereocal.toml, a robot.toml and a poses.csv to start from
     Init(Init),
     /// Print a page of the guide, or make one HTML file of all pages

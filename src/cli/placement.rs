@@ -29,7 +29,6 @@ pub struct ExportPlacement {
     /// Name of the target's frame
     #[arg(long, value_name = "NAME", default_value = "target")]
     pub target_frame: String,
-    /// Where it goes.
     #[command(flatten)]
     pub files: Files,
 }

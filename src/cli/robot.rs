@@ -5,7 +5,7 @@ use clap::{Args, Subcommand, ValueEnum};
 
 use super::board::Target;
 use super::output::{Files, Output};
-use super::values::{between, count, number, whole};
+use super::values::{between, number, whole, whole_between};
 
 /// `stereocal identify`
 #[derive(Debug, Args)]
@@ -13,7 +13,6 @@ pub struct Identify {
     /// Measurements: CSV with any delimiter, xlsx, xls, ods (FILE#SHEET), program lines; repeat for files that complete each other or are stacked [default: measurements.csv in the results folder]
     #[arg(long, value_name = "FILE")]
     pub measurements: Vec<Utf8PathBuf>,
-    /// How to read them.
     #[command(flatten)]
     pub table: TableFlags,
     /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]
@@ -37,7 +36,6 @@ pub struct Identify {
     /// Seed of every random draw
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     pub seed: u64,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
@@ -59,7 +57,6 @@ pub struct Verify {
     /// Measurements, in any form that `identify` reads; without verify rows all of them are judged
     #[arg(long, value_name = "FILE", required = true)]
     pub measurements: Vec<Utf8PathBuf>,
-    /// How to read them.
     #[command(flatten)]
     pub table: TableFlags,
     /// A robot to judge; repeat for more
@@ -95,16 +92,16 @@ pub struct Plan {
     #[arg(long, value_name = "FILE")]
     pub calibration: Option<Utf8PathBuf>,
     /// Poses to identify from; centres come on top [default: 60; 262 with --plan paper]
-    #[arg(long, value_name = "N", value_parser = count(4, 2000))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(4, 2000))]
     pub poses: Option<usize>,
     /// Poses to verify with [default: 20; 50 with --plan paper]
-    #[arg(long, value_name = "N", value_parser = count(0, 2000))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(0, 2000))]
     pub verify: Option<usize>,
     /// Which plan
     #[arg(long, value_enum, default_value = "optimal")]
     pub plan: PlanKind,
     /// Only so many poses a placement, near its middle, to find out where the cameras stand
-    #[arg(long, value_name = "N", value_parser = count(2, 50), conflicts_with = "after")]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(2, 50), conflicts_with = "after")]
     pub first: Option<usize>,
     /// measurements.csv of the first poses: says where the cameras stand and what is known already
     #[arg(long, value_name = "MEASUREMENTS")]
@@ -113,7 +110,7 @@ pub struct Plan {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>)]
     pub seed: u64,
     /// Candidates to choose from
-    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = count(200, 200_000))]
+    #[arg(long, value_name = "N", default_value_t = 20_000, value_parser = whole_between::<usize>(200, 200_000))]
     pub pool: usize,
     /// Middle of a sphere, base frame, mm; repeat for more [default: the paper's four, scaled by the robot's reach]
     #[arg(long, value_name = "X,Y,Z", allow_negative_numbers = true, value_parser = point)]
@@ -136,7 +133,6 @@ pub struct Plan {
     /// Pose repeatability (ISO 9283 RP), mm
     #[arg(long, value_name = "MM", default_value_t = 0.02, allow_negative_numbers = true, value_parser = between(0.0, 100.0))]
     pub repeatability_mm: f64,
-    /// The target on the robot.
     #[command(flatten)]
     pub target: Target,
     /// Speed of the programs, per cent of the joints' own
@@ -152,7 +148,6 @@ pub struct Plan {
     /// with more than six joints it is needed for programs in makers' languages with six axes and then external ones
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = whole::<usize>)]
     pub joint_order: Vec<usize>,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
@@ -191,20 +186,11 @@ pub struct Compensate {
     /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status is 1
     #[arg(long)]
     pub joint_targets_only: bool,
-    /// Results.
     #[command(flatten)]
     pub output: Output,
 }
 
-/// `stereocal robot`
-#[derive(Debug, Args)]
-pub struct RobotCommand {
-    /// What to do.
-    #[command(subcommand)]
-    pub what: RobotWhat,
-}
-
-/// What `robot` can do.
+/// What `stereocal robot` can do.
 #[derive(Debug, Subcommand)]
 pub enum RobotWhat {
     /// A robot file from a URDF, or from a table in CSV (alpha_deg,a_mm,theta_deg,d_mm a joint)
@@ -237,7 +223,6 @@ pub struct RobotImport {
     /// Units of a table's angles and lengths: deg or rad, mm, cm, m, um or in [default: what the names say, else what the numbers and words around them show]
     #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
     pub units: Option<String>,
-    /// Where it goes.
     #[command(flatten)]
     pub place: RobotPlace,
 }
@@ -247,7 +232,6 @@ pub struct RobotImport {
 pub struct RobotNew {
     /// One of `stereocal robot list`, or a part that only one of them has: irb120, "IRB 120"
     pub name: String,
-    /// Where it goes.
     #[command(flatten)]
     pub place: RobotPlace,
 }
@@ -301,7 +285,6 @@ pub struct ExportRobot {
     /// The nominal robot that deviations are counted from (--format ur-calibration) [default: the common arm of the same name]
     #[arg(long, value_name = "FILE")]
     pub nominal: Option<Utf8PathBuf>,
-    /// Where it goes.
     #[command(flatten)]
     pub files: Files,
 }

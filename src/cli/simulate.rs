@@ -3,7 +3,7 @@
 use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
-use super::values::{between, count, whole, whole_between};
+use super::values::{between, whole, whole_between};
 use crate::simulate::settings::Orientation;
 
 /// `stereocal simulate`
@@ -22,13 +22,13 @@ pub struct Simulate {
     #[arg(long, value_enum)]
     pub orientation: Option<Orientation>,
     /// Pairs of pictures of the check board [default: the preset's]
-    #[arg(long, value_name = "N", value_parser = count(0, 10_000))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(0, 10_000))]
     pub check_pairs: Option<usize>,
     /// Robot poses to identify from, besides the centres [default: the preset's]
-    #[arg(long, value_name = "N", value_parser = count(0, 100_000))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(0, 100_000))]
     pub samples: Option<usize>,
     /// Robot poses to verify with [default: the preset's]
-    #[arg(long, value_name = "N", value_parser = count(0, 100_000))]
+    #[arg(long, value_name = "N", value_parser = whole_between::<usize>(0, 100_000))]
     pub verify: Option<usize>,
     /// No pictures: measurements.csv with noise
     #[arg(long)]

@@ -144,12 +144,14 @@ fn with_value(arg: &Arg) -> String {
     format!("`--{}{}`", arg.get_long().unwrap_or_default(), value.unwrap_or_default())
 }
 
+/// Whether a flag is among those that are missing, as the parser writes them.
+fn is_among(arg: &Arg, missing: &[String]) -> bool {
+    arg.get_long().is_some_and(|long| missing.iter().any(|flag| flag.starts_with(&format!("--{long} "))))
+}
+
 /// For flags that are missing: others that do in their place.
 fn in_place_of(command: &Command, missing: &[String]) -> Option<String> {
-    let is_missing = |arg: &&Arg| {
-        arg.get_long().is_some_and(|long| missing.iter().any(|flag| flag.starts_with(&format!("--{long} "))))
-    };
-    let asked = command.get_arguments().find(is_missing)?;
+    let asked = command.get_arguments().find(|arg| is_among(arg, missing))?;
     let instead = command.get_arguments().find(|other| {
         other.get_long().is_some()
             && command.get_arg_conflicts_with(other).iter().any(|arg| arg.get_id() == asked.get_id())
@@ -177,9 +179,8 @@ fn as_mm(flag: &str, value: &str) -> Option<String> {
 fn choices(command: &Command, missing: &[String]) -> Option<String> {
     let of = |arg: &Arg| {
         let long = arg.get_long()?;
-        let is_missing = missing.iter().any(|flag| flag.starts_with(&format!("--{long} ")));
         let words: Vec<String> = arg.get_possible_values().iter().map(|value| value.get_name().to_owned()).collect();
-        (is_missing && !words.is_empty()).then(|| format!("`--{long}` takes one of {}", words.join(", ")))
+        (is_among(arg, missing) && !words.is_empty()).then(|| format!("`--{long}` takes one of {}", words.join(", ")))
     };
     command.get_arguments().find_map(of)
 }

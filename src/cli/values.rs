@@ -59,8 +59,3 @@ where
         _ => Err(format!("a whole number from {least} to {most} is needed")),
     }
 }
-
-/// Reads a count of a range.
-pub(super) fn count(least: usize, most: usize) -> impl Fn(&str) -> Result<usize, String> + Clone {
-    whole_between(least, most)
-}

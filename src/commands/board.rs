@@ -13,7 +13,6 @@ use crate::progress;
 /// A side of which a printer of 300 dots an inch draws a twelfth no longer, mm.
 const FINE_MM: f64 = 1.0;
 
-/// Runs the command.
 pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
     // The command line asks for one of the two.
@@ -49,14 +48,10 @@ pub fn run(args: &PrintBoard, config: &Config, run: Run) -> Result<Outcome> {
         });
         format!("{object:#}\n")
     } else {
+        let Sheet { paper, width_mm, height_mm, .. } = &sheet;
         format!(
-            "{} on {} ({} x {} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `stereocal camera-check IMAGES --board {}`\n",
-            board,
-            sheet.paper,
-            sheet.width_mm,
-            sheet.height_mm,
-            files.join(", "),
-            board
+            "{board} on {paper} ({width_mm} x {height_mm} mm): {}\nnext: print it at 100 %, measure it, and name it as it came out: `stereocal camera-check IMAGES --board {board}`\n",
+            files.join(", ")
         )
     };
     Ok(Outcome { stdout, status: Status::Done })

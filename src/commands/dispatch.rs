@@ -2,8 +2,7 @@
 
 use camino::Utf8Path;
 
-use super::error::{BesideEarlier, Earlier, Error, Result};
-use super::outcome::Outcome;
+use super::error::{BesideEarlier, Earlier, Error, Outcome, Result};
 use super::{
     board, camera_check, compensate, export, identify, locate, measure, plan, rectify, report, robot, simulate, start,
     verify,
@@ -54,12 +53,12 @@ fn command(command: &Command, config: &Config, run: Run) -> Result<Outcome> {
         Command::Simulate(args) => simulate::run(args, config, run),
         Command::Plan(args) => plan::run(args, config, run),
         Command::Compensate(args) => compensate::run(args, config, run),
-        Command::Export(args) => export::run(args, config, run),
+        Command::Export(what) => export::run(what, config, run),
         Command::Init(args) => start::init::run(args, run),
         Command::Guide(args) => start::guide::run(args, run),
         Command::Completions(args) => Ok(start::shell::completions(args)),
         Command::Man(args) => start::shell::man(args, run),
-        Command::Robot(args) => robot::run(args, config, run),
+        Command::Robot(what) => robot::run(what, config, run),
     }
 }
 

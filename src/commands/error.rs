@@ -1,4 +1,4 @@
-//! The sum of what can end a command.
+//! What a command ends with: its outcome, or one of all that can go wrong.
 
 use camino::Utf8PathBuf;
 
@@ -6,6 +6,15 @@ use crate::diagnostic::{Explain, Status};
 
 /// Result of a command.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What a command leaves for `main` to print, and how it ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    /// The result: a short table, or JSON.
+    pub stdout: String,
+    /// The exit status.
+    pub status: Status,
+}
 
 /// Anything that ends a command.
 #[derive(Debug, thiserror::Error)]

@@ -18,15 +18,13 @@ use crate::identify::record::{self, Advice, Findings, Record, quality};
 use crate::identify::run::{Identification, identify, step_count};
 use crate::identify::{Error, Method, Settings};
 use crate::measurements::{Given, Measurement, Role, Source};
-use crate::progress;
-use crate::report;
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 use crate::robot::{self, Robot};
+use crate::{progress, report};
 
 /// What `simulate` writes into the working directory.
 const DEFAULT_ROBOT: &str = "robot.toml";
 
-/// Runs the command.
 pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let settings = settings(args, config);
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
@@ -58,7 +56,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
         examine::in_hand::refuse(&set, &nominal)?;
     }
     let doubts = (unexplained.is_some(), along.robots.is_some());
-    let Searched { found, not_run } = search(&set, &nominal, &settings, args.seed, doubts, &bar)?;
+    let (found, not_run) = search(&set, &nominal, &settings, args.seed, doubts, &bar)?;
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
     let mut findings = Findings::new(findings, (against, unexplained), of_fit, &along, &set, &found);
@@ -80,12 +78,8 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
 }
 
 /// What was identified, and why not all methods were run.
-struct Searched {
-    found: Identification,
-    not_run: Option<String>,
-}
-
-/// Identifies. Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
+///
+/// Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
 /// same neighbourhood, for longer where there is nothing to find, and change nothing of the verdict. If the robot of that method explains rows
 /// that seemed to be unexplained, the others follow.
 fn search(
@@ -95,7 +89,7 @@ fn search(
     seed: u64,
     (unexplained, several_robots): (bool, bool),
     bar: &progress::Step,
-) -> std::result::Result<Searched, Error> {
+) -> std::result::Result<(Identification, Option<String>), Error> {
     let step = |step: &str| bar.begin(step);
     if settings.method.is_none() && (unexplained || several_robots) {
         let one = Settings { method: Some(Method::TrustRegion), ..settings.clone() };
@@ -103,11 +97,11 @@ fn search(
         if several_robots || !record::findings::is_explained(set, &found) {
             let not_run = "only trust-region was run: the other methods search the same neighbourhood of the robot file, and what speaks against \
                            the result would stay; `--method stapso` runs one of them all the same";
-            return Ok(Searched { found, not_run: Some(not_run.to_owned()) });
+            return Ok((found, Some(not_run.to_owned())));
         }
         bar.lengthen(step_count(&one));
     }
-    Ok(Searched { found: identify(set, nominal, settings, seed, &step)?, not_run: None })
+    Ok((identify(set, nominal, settings, seed, &step)?, None))
 }
 
 /// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says is not said before it, unless it goes elsewhere.
@@ -223,17 +217,12 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Measured {
         return Measured::default();
     }
     let calibration = folder.join("calibration.json");
-    let used = measured_by.inputs.last();
-    let stale =
-        used.zip(Digested::read(&calibration)).filter(|(used, here)| !used.same_content(here)).map(|(used, _)| {
-            Finding::new(
-                format!(
-                    "the measurements were made with another calibration than {calibration} ({} of {})",
-                    used.file, measured_by.date
-                ),
-                "run `stereocal measure` again",
-            )
-        });
+    let used = measured_by.inputs.last().zip(Digested::read(&calibration));
+    let stale = used.filter(|(used, here)| !used.same_content(here)).map(|(Digested { file, .. }, _)| {
+        let date = &measured_by.date;
+        let said = format!("the measurements were made with another calibration than {calibration} ({file} of {date})");
+        Finding::new(said, "run `stereocal measure` again")
+    });
     out.measured_by(measured_by);
     Measured { record: Some(record), stale }
 }
@@ -301,14 +290,10 @@ fn write(
     if record.advice == Advice::DoNotUse {
         holds = format!("Do not use this robot: {}.", record.reason);
     }
-    let scale = record
-        .scale
-        .filter(|_| record.advice != Advice::DoNotUse)
-        .map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
-    out.write_toml(
-        IDENTIFIED,
-        &format!("# {holds}\n{scale}{}", robot::file::to_toml_checked(identified, Some(&check))),
-    )?;
+    let scale = record.scale.filter(|_| record.advice != Advice::DoNotUse);
+    let scale = scale.map_or(String::new(), |scale| format!("# Not in this: {}.\n", scale.sentence()));
+    let toml = robot::file::to_toml_checked(identified, Some(&check));
+    out.write_toml(IDENTIFIED, &format!("# {holds}\n{scale}{toml}"))?;
     let json = out.write_json("identification.json", record)?;
     out.write_json(PLACEMENT, &placement)?;
     report::page::write(out, "identify.html", page)?;

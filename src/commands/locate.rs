@@ -31,7 +31,6 @@ struct LocatedFile {
     fit: Fit,
 }
 
-/// Runs the command.
 pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.measure.output.out.clone().unwrap_or_else(|| config.out.clone());
     let (robot, check) = robot::file::read_checked(&args.robot)?;

@@ -11,7 +11,6 @@ mod heed;
 pub mod identify;
 pub mod locate;
 mod measure;
-mod outcome;
 pub mod plan;
 pub mod rectify;
 pub mod report;
@@ -21,5 +20,4 @@ pub mod start;
 pub mod verify;
 
 pub use dispatch::run;
-pub use error::{Error, Result};
-pub use outcome::Outcome;
+pub use error::{Error, Outcome, Result};

@@ -1,6 +1,6 @@
 //! `stereocal plan`: robot, rig and spheres to poses, and robot programs that visit them.
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::Vector3;
 
 use super::heed::heed_rig;
@@ -34,7 +34,6 @@ const APPROACH: f64 = 2.0;
 /// Name of the programs.
 const PROGRAM: &str = "stereocal_plan";
 
-/// Runs the command.
 pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let out = args.output.out.clone().unwrap_or_else(|| config.out.clone());
     let rig_file = calibration::file(args.calibration.as_deref(), &out, &config.out)?;
@@ -52,16 +51,14 @@ pub fn run(args: &Arguments, config: &Config, run: Run) -> Result<Outcome> {
     let robot = within_a_turn(robot);
     let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
     let order = joint_order(args, &slides)?;
-    let earlier = match &args.after {
-        Some(path) => Some(super::identify::read(&Source::of(path.clone()), &robot)?),
-        None => None,
+    let read = |path: &Utf8PathBuf| {
+        let rows = super::identify::read(&Source::of(path.clone()), &robot)?;
+        check_one_target(&rows, path).map(|()| rows)
     };
-    if let (Some(rows), Some(path)) = (&earlier, &args.after) {
-        check_one_target(rows, path)?;
-    }
+    let earlier = args.after.as_ref().map(read).transpose()?;
     let out = OutDir::open(&out)?;
     let inputs = [Some(&rig_file), robot_file.as_ref(), args.after.as_ref()];
-    let inputs: Vec<&camino::Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
+    let inputs: Vec<&Utf8Path> = inputs.into_iter().flatten().map(|path| path.as_path()).collect();
     let out = out.for_run(&Run { force: args.output.force, ..run }, &inputs);
     out.check_free(&["poses.csv", "plan.json", "plan.html"])?;
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
@@ -108,17 +105,9 @@ fn joint_order(args: &Arguments, slides: &[bool]) -> Result<JointOrder> {
 
 /// A plan is for the board whose centre is the mark point.
 fn check_one_target(rows: &[Measurement], path: &Utf8Path) -> Result<()> {
-    match rows.iter().find(|row| row.target != rows[0].target) {
-        None => Ok(()),
-        Some(other) => Err(crate::plan::Error::Measured {
-            message: format!(
-                "rows of several targets (`{}` and `{}`); a plan is for one",
-                rows[0].target, other.target
-            ),
-            place: path.to_string(),
-        }
-        .into()),
-    }
+    let Some(other) = rows.iter().find(|row| row.target != rows[0].target) else { return Ok(()) };
+    let message = format!("rows of several targets (`{}` and `{}`); a plan is for one", rows[0].target, other.target);
+    Err(crate::plan::Error::Measured { message, place: path.to_string() }.into())
 }
 
 fn settings(args: &Arguments) -> Settings {

@@ -30,7 +30,6 @@ const LITTLE: f64 = 0.25;
 /// Pairs on which each board is looked for before it is taken as not there: on pictures of something else the search takes seconds.
 const FIRST_LOOKED_AT: usize = 4;
 
-/// Runs the command.
 pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
@@ -83,20 +82,15 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
-    let status = if lost.is_some() { Status::OutOfTolerance } else { rows(&file) };
+    let of_rows = report::rectify::doubt(&file);
+    of_rows.iter().filter(|_| lost.is_none()).for_each(progress::warn);
+    let status = if lost.is_some() || of_rows.is_some() { Status::OutOfTolerance } else { Status::Done };
     let json = out.write_json("rectified.json", &file)?;
-    doubts.extend(lost.into_iter().chain(report::rectify::doubt(&file)));
+    doubts.extend(lost.into_iter().chain(of_rows));
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
     Ok(Outcome { stdout, status: status.or_worse(at_best) })
-}
-
-/// Says whether rows do not agree; with which status the run then ends at best.
-fn rows(file: &RectifiedFile) -> Status {
-    let doubt = report::rectify::doubt(file);
-    doubt.iter().for_each(progress::warn);
-    if doubt.is_some() { Status::OutOfTolerance } else { Status::Done }
 }
 
 /// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture

@@ -13,7 +13,6 @@ use crate::files::{self, OutDir};
 use crate::progress;
 use crate::report::{self, day::Day};
 
-/// Runs the command.
 pub fn run(args: &Report, config: &Config, run: Run) -> Result<Outcome> {
     let folder = args.out.as_deref().unwrap_or(&config.out);
     let parts = ["camera-check.json", "measure.json", "identification.json"].map(|name| folder.join(name));
@@ -47,35 +46,31 @@ fn changed(folder: &Utf8Path) -> Vec<String> {
 
 /// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.
 fn breaks(folder: &Utf8Path) -> Vec<String> {
-    let provenance = |name: &str| Provenance::of_json(&folder.join(name));
-    let now = |name: &str| Digested::read(&folder.join(name));
+    type Files = fn(Provenance) -> Vec<Digested>;
+    let files = |result: &str, of: Files| Provenance::of_json(&folder.join(result)).map(of).unwrap_or_default();
+    let compared: [(&str, Files, &str, &str); 3] = [
+        ("camera-check.json", |run| run.outputs, "calibration.json", "camera-check"),
+        ("measure.json", |run| run.inputs, "calibration.json", "measure"),
+        ("identification.json", |run| run.inputs, "measurements.csv", "identify"),
+    ];
     let mut breaks = Vec::new();
-    let mut compare = |then: Option<Digested>, name: &str, of: &str, command: &str| {
-        if let (Some(then), Some(now)) = (then, now(name))
-            && !then.same_content(&now)
-        {
+    for (result, of, name, command) in compared {
+        let then = files(result, of).into_iter().find(|file| file.file.ends_with(name));
+        let now = Digested::read(&folder.join(name));
+        if then.zip(now).is_some_and(|(then, now)| !then.same_content(&now)) {
             breaks.push(format!(
-                "{of} was made with another {name} than the one in {folder}: run `stereocal {command}` again"
+                "{result} was made with another {name} than the one in {folder}: run `stereocal {command}` again"
             ));
         }
-    };
-    let named = |list: Vec<Digested>, name: &str| list.into_iter().find(|file| file.file.ends_with(name));
-    let written = provenance("camera-check.json").and_then(|p| named(p.outputs, "calibration.json"));
-    compare(written, "calibration.json", "camera-check.json", "camera-check");
-    let used = provenance("measure.json").and_then(|p| named(p.inputs, "calibration.json"));
-    compare(used, "calibration.json", "measure.json", "measure");
-    let fitted = provenance("identification.json").and_then(|p| named(p.inputs, "measurements.csv"));
-    compare(fitted, "measurements.csv", "identification.json", "identify");
-    let results = [("camera-check.json", "camera-check"), ("measure.json", "measure")];
-    breaks.extend(results.into_iter().flat_map(|(name, command)| {
-        let inputs = provenance(name).map(|made| made.inputs).unwrap_or_default();
-        let changed =
-            inputs.into_iter().filter(|input| !Utf8Path::new(&input.file).starts_with(folder) && input.is_other_now());
-        changed
-            .map(move |input| {
-                format!("{} changed since {name} was made of it: run `stereocal {command}` again", input.file)
-            })
-            .collect::<Vec<_>>()
-    }));
+    }
+    for (result, command) in [("camera-check.json", "camera-check"), ("measure.json", "measure")] {
+        let elsewhere = |input: &Digested| !Utf8Path::new(&input.file).starts_with(folder);
+        for input in files(result, |run| run.inputs) {
+            if elsewhere(&input) && input.is_other_now() {
+                let file = input.file;
+                breaks.push(format!("{file} changed since {result} was made of it: run `stereocal {command}` again"));
+            }
+        }
+    }
     breaks
 }

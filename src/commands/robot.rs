@@ -4,23 +4,22 @@ use camino::Utf8Path;
 use nalgebra::Point3;
 
 use super::{Outcome, Result};
-use crate::cli::{DhConvention, RobotCommand, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
+use crate::cli::{DhConvention, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
 use crate::config::Config;
 use crate::diagnostic::{Explain, Status};
+use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::files::{self, OutDir};
 use crate::formats::robots::{dh_csv, urdf};
 use crate::measurements::{Measurement, Observed, Source, is_not_near};
 use crate::progress;
 use crate::report::robot as report;
-use crate::robot::catalogue::names;
-use crate::robot::catalogue::{self, Convention};
+use crate::robot::catalogue::{self, Convention, names};
 use crate::robot::tool_fit::Start;
 use crate::robot::{Error, Robot, file};
 use crate::tables::names::Unit;
 
-pub fn run(args: &RobotCommand, config: &Config, run: Run) -> Result<Outcome> {
-    let stdout = match &args.what {
+pub fn run(what: &RobotWhat, config: &Config, run: Run) -> Result<Outcome> {
+    let stdout = match what {
         RobotWhat::Import(args) => import(args, config, run)?,
         RobotWhat::New(args) => new(args, config, run)?,
         RobotWhat::List => report::list(),
@@ -81,12 +80,8 @@ fn table(args: &RobotImport, name: &str) -> Result<Robot> {
         .collect();
     match &ways[..] {
         [] => {
-            return Err(refuse(
-                args,
-                "beta_deg stands beside alpha and a of a modified table".to_owned(),
-                "`--dh modified` reads it",
-            )
-            .into());
+            let message = "beta_deg stands beside alpha and a of a modified table".to_owned();
+            return Err(refuse(args, message, "`--dh modified` reads it").into());
         }
         [way] => {
             let why = if args.dh.is_some() { "--dh says so".to_owned() } else { way.0.convention().1 };
@@ -117,11 +112,12 @@ fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error
 /// The way to read a table that measurements of the robot decide for.
 fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
     let source = Source { files: args.measurements.clone(), ..Source::default() };
-    let mut left: Vec<(f64, &dh_csv::Reading, Convention)> = Vec::new();
+    let mut left: Vec<(f64, Way)> = Vec::new();
     let mut unread = Vec::new();
-    for (reading, convention) in ways {
-        match left_mm(&reading.robot(name, *convention), &source) {
-            Ok(of_way) => left.extend(of_way.map(|left| (left, *reading, *convention))),
+    for way in ways {
+        let robot = way.0.robot(name, way.1);
+        match source.read(&robot) {
+            Ok((rows, _)) => left.extend(left_mm(&robot, &rows).map(|left| (left, *way))),
             Err(error) => unread.push(error),
         }
     }
@@ -135,20 +131,18 @@ fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
             let hint = "leave in the measurements the joints and the measured points alone, or `--dh` and `--columns` read the table without them";
             Err(Error::Table { message, place, hint: hint.to_owned() }.into())
         }
-        [] => Err(refuse(
-            args,
-            "no way to read the table comes near to the measurements".to_owned(),
-            "see whether they are of one robot; `--dh` and `--columns` read the table without them",
-        )
-        .into()),
+        [] => {
+            let message = "no way to read the table comes near to the measurements".to_owned();
+            let hint = "see whether they are of one robot; `--dh` and `--columns` read the table without them";
+            Err(refuse(args, message, hint).into())
+        }
         [best, next, ..] if next.0 < CLEAR * best.0 => {
-            let way = |(left, r, c): &(f64, &dh_csv::Reading, Convention)| {
-                format!("`--dh {} --columns {}` ({left:.2} mm)", c.name(), r.columns)
-            };
+            let way =
+                |(left, (r, c)): &(f64, Way)| format!("`--dh {} --columns {}` ({left:.2} mm)", c.name(), r.columns);
             let message = "more than one way to read the table fits the measurements".to_owned();
             Err(refuse(args, message, &format!("{} or {} says which", way(best), way(next))).into())
         }
-        [best, ..] => take(args, name, (best.1, best.2), &format!("it leaves {:.2} mm of the measurements", best.0)),
+        [best, ..] => take(args, name, best.1, &format!("it leaves {:.2} mm of the measurements", best.0)),
     }
 }
 
@@ -157,11 +151,7 @@ type Placement = (Vec<Vec<f64>>, Vec<Point3<f64>>);
 
 /// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm; `None` where it does
 /// not fit them.
-fn left_mm(robot: &Robot, source: &Source) -> std::result::Result<Option<f64>, files::Error> {
-    Ok(of_rows_mm(robot, &source.read(robot)?.0))
-}
-
-fn of_rows_mm(robot: &Robot, rows: &[Measurement]) -> Option<f64> {
+fn left_mm(robot: &Robot, rows: &[Measurement]) -> Option<f64> {
     let mut groups: std::collections::BTreeMap<&str, Placement> = std::collections::BTreeMap::new();
     for row in rows.iter().filter(|row| row.target == rows[0].target) {
         if let Observed::Position { point_mm, .. } = row.observed {

@@ -10,9 +10,8 @@ use crate::robot;
 use crate::simulate::picture::psf::{Defocus, Optics};
 use crate::simulate::rig::DISTANCE_MM;
 use crate::simulate::settings::{RobotDeviations, Settings};
-use crate::simulate::true_robot;
-use crate::simulate::truth_files;
 use crate::simulate::world::World;
+use crate::simulate::{true_robot, truth_files};
 
 /// Entrance pupil of the paper's 25 mm lenses at f/16, mm.
 const PUPIL_MM: f64 = 25.0 / 16.0;

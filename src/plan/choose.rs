@@ -45,10 +45,6 @@ impl Information {
         self.update(rows, 1.0);
     }
 
-    fn remove(&mut self, rows: &Rows) {
-        self.update(rows, -1.0);
-    }
-
     fn update(&mut self, rows: &Rows, sign: f64) {
         let width = self.count + FRAME;
         let index = |k: usize| if k < self.count { k } else { k + FRAME * rows.group };
@@ -252,7 +248,7 @@ fn exchange(problem: &Problem, start: &Information, rows: &[Rows], chosen: &mut 
         for i in 0..chosen.len() {
             let old = chosen[i];
             let members = chosen.iter().filter(|&&k| rows[k].group == rows[old].group).count();
-            information.remove(&rows[old]);
+            information.update(&rows[old], -1.0);
             let blocks = Blocks::new(problem, &information);
             let stays = blocks.gain(&rows[old]);
             let may = |k: &usize| !chosen.contains(k) && (members > LEAST_A_GROUP || rows[*k].group == rows[old].group);

@@ -27,8 +27,7 @@ fn way(robot: &Robot, a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// A short tour from a start: the nearest next one, then turned pieces as long as that is shorter (2-opt).
-fn tour<'a>(robot: &Robot, start: &[f64], list: Vec<&'a Candidate>) -> Vec<&'a Candidate> {
-    let mut left = list;
+fn tour<'a>(robot: &Robot, start: &[f64], mut left: Vec<&'a Candidate>) -> Vec<&'a Candidate> {
     let mut order: Vec<&Candidate> = Vec::with_capacity(left.len());
     while !left.is_empty() {
         let from = order.last().map_or(start, |c| c.joints_rad.as_slice());
@@ -69,19 +68,17 @@ pub fn poses(
     let used = |name: &str| measured.is_some_and(|rows| rows.iter().any(|r| r.at.pose == name));
     let mut planned = Vec::new();
     for (group, placement) in placements.iter().enumerate() {
-        let of =
-            |list: &'_ [Candidate]| -> Vec<usize> { (0..list.len()).filter(|&k| list[k].group == group).collect() };
-        let center = of(centers).first().map(|&k| &centers[k]);
+        let [centers, samples, verify] =
+            [centers, samples, verify].map(|list| list.iter().filter(|c| c.group == group).collect::<Vec<_>>());
+        let center = centers.first().copied();
         let start = center.map_or_else(Vec::new, |c| c.joints_rad.clone());
-        let pick = |list: &[Candidate]| -> Vec<Candidate> { of(list).into_iter().map(|k| list[k].clone()).collect() };
-        let (samples, verify) = (pick(samples), pick(verify));
         let has_center =
             measured.is_some_and(|rows| rows.iter().any(|r| r.at.group == placement.name && r.at.role == Role::Center));
         let mut list: Vec<(Role, &Candidate)> = Vec::new();
         list.extend(center.filter(|_| !has_center).map(|c| (Role::Center, c)));
-        list.extend(tour(robot, &start, samples.iter().collect()).into_iter().map(|c| (Role::Sample, c)));
+        list.extend(tour(robot, &start, samples).into_iter().map(|c| (Role::Sample, c)));
         let end = list.last().map_or(start, |(_, c)| c.joints_rad.clone());
-        list.extend(tour(robot, &end, verify.iter().collect()).into_iter().map(|c| (Role::Verify, c)));
+        list.extend(tour(robot, &end, verify).into_iter().map(|c| (Role::Verify, c)));
         let mut number = 0;
         for (role, candidate) in list {
             while used(&format!("g{}_{number:03}", placement.name)) {

@@ -8,8 +8,7 @@ use super::predict::Problem;
 use super::scene::{PoseNoise, Scene, flange_from_target, placements, safe};
 use super::*;
 use crate::measurements::{Measurement, RobotPose, Role};
-use crate::robot::Robot;
-use crate::robot::catalogue;
+use crate::robot::{Robot, catalogue};
 use crate::simulate::rig::{RigDrawing, true_rig};
 
 const NOISE_MM: f64 = 0.02;

@@ -37,11 +37,11 @@ pub fn list(text: &str, at: usize, most: usize, number: fn(&str, usize) -> Optio
     (numbers, end)
 }
 
-/// Numbers behind `labels` in their order, each label with blanks and signs of `between` behind it.
-pub fn labelled(text: &str, at: usize, labels: &[String], between: &[&str]) -> Option<Vec<Number>> {
+/// Numbers behind `labels` in their order, units and commas between them.
+pub fn labelled(text: &str, at: usize, labels: &[String]) -> Option<Vec<Number>> {
     let (mut numbers, mut end) = (Vec::new(), at);
     for label in labels {
-        for skipped in between {
+        for skipped in ["deg", "mm", ","] {
             end = word(text, end, skipped).unwrap_or(end);
         }
         end = word(text, end, label)?;

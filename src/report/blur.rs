@@ -72,16 +72,15 @@ fn medians<'a>(corners: impl Iterator<Item = &'a Corner>, (width, height): (u32,
 fn grid(cells: &[Option<f64>]) -> Markup {
     let header: Vec<String> = (1..=CELLS).map(|c| c.to_string()).collect();
     let header: Vec<&str> = std::iter::once("").chain(header.iter().map(String::as_str)).collect();
-    let row = |(r, cells): (usize, &[Option<f64>])| {
+    let rows = cells.chunks(CELLS).enumerate().map(|(r, cells)| {
         let name = match r {
             0 => "top".to_owned(),
             r if r + 1 == CELLS => "bottom".to_owned(),
             r => format!("row {}", r + 1),
         };
-        std::iter::once(name).chain(cells.iter().map(|blur| number(*blur, 2))).collect()
-    };
-    let rows: Vec<Vec<String>> = cells.chunks(CELLS).enumerate().map(row).collect();
-    page::table(&header, &rows)
+        std::iter::once(name).chain(cells.iter().map(|blur| number(*blur, 2)))
+    });
+    page::table(&header, rows)
 }
 
 fn conclusion(cells: &[Option<f64>]) -> String {

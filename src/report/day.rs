@@ -60,17 +60,22 @@ fn figure<'a>(value: &'a Value, pointer: &str) -> Option<&'a Value> {
     value.pointer(&judged).or_else(|| value.pointer(pointer))
 }
 
+/// A number as it stands there.
+fn raw(value: &Value, pointer: &str) -> Option<f64> {
+    value.pointer(pointer).and_then(Value::as_f64)
+}
+
 fn mm(value: &Value, pointer: &str) -> String {
     short(figure(value, pointer).and_then(Value::as_f64))
 }
 
 /// A length that is no error, mm.
 fn length(value: &Value, pointer: &str) -> String {
-    number(value.pointer(pointer).and_then(Value::as_f64), 3)
+    number(raw(value, pointer), 3)
 }
 
 fn px(value: &Value, pointer: &str) -> String {
-    number(value.pointer(pointer).and_then(Value::as_f64), 4)
+    number(raw(value, pointer), 4)
 }
 
 fn count(value: &Value, pointer: &str) -> String {
@@ -120,8 +125,8 @@ fn length_words(check: &Value) -> String {
 
 /// Error and expanded uncertainty of the length that the verdict looks at, and their sum, mm.
 fn judged(check: &Value) -> [String; 3] {
-    let of = |key: &str| check.pointer(&format!("/judged_length/{key}")).and_then(Value::as_f64).unwrap_or(f64::NAN);
-    summed(of("error_mm"), of("uncertainty_mm"))
+    let of = |pointer: &str| raw(check, pointer).unwrap_or(f64::NAN);
+    summed(of("/judged_length/error_mm"), of("/judged_length/uncertainty_mm"))
 }
 
 /// The tolerance as it was given, mm.
@@ -131,15 +136,15 @@ fn limit(check: &Value) -> String {
 
 /// A bound on lengths, mm, which is rounded up.
 fn bound(check: &Value, pointer: &str) -> String {
-    let of = |pointer: &str| check.pointer(pointer).and_then(Value::as_f64).unwrap_or(f64::NAN);
+    let of = |pointer: &str| raw(check, pointer).unwrap_or(f64::NAN);
     at_most(of(pointer), of("/tolerance_mm"))
 }
 
 /// Which of the checks says to what lengths can be trusted: the largest of those in mm.
 fn trusted_by(check: &Value) -> String {
-    let trusted = check.pointer("/trusted_mm").and_then(Value::as_f64);
+    let trusted = raw(check, "/trusted_mm");
     let lines = check.get("evidence").and_then(Value::as_array);
-    let of = |line: &Value| line.get("value").and_then(Value::as_f64).filter(|_| text(line, "/unit") == "mm");
+    let of = |line: &Value| raw(line, "/value").filter(|_| text(line, "/unit") == "mm");
     let line = lines.into_iter().flatten().find(|line| trusted.is_some() && of(line) == trusted);
     line.map_or_else(String::new, |line| format!(" (the largest of all checks in mm: {})", text(line, "/what")))
 }
@@ -152,10 +157,8 @@ fn robot_words(robot: &Value) -> String {
     if text(robot, "/advice") == "do-not-use" {
         return format!("do not use the identified robot: {}", text(robot, "/reason"));
     }
-    let doubt = match text(robot, "/advice") {
-        "check" => format!("; check before you use the identified robot: {}", text(robot, "/reason")),
-        _ => String::new(),
-    };
+    let doubts = || format!("; check before you use the identified robot: {}", text(robot, "/reason"));
+    let doubt = if text(robot, "/advice") == "check" { doubts() } else { String::new() };
     let before = mm(robot, "/before/verify/mean_abs_mm");
     format!("mean distance error {before} mm before, {} mm after{doubt}", after(robot))
 }
@@ -191,14 +194,9 @@ pub fn page(day: &Day) -> String {
         Some(check) => format!("Rig: {}{}", text(check, "/verdict").to_uppercase(), day.advised()),
         None => format!("Without a camera check{}", day.advised()),
     };
-    let words: Vec<String> = [
-        (&day.check, length_words as fn(&Value) -> String),
-        (&day.measured, measured_words),
-        (&day.robot, robot_words),
-    ]
-    .into_iter()
-    .filter_map(|(part, say)| part.as_ref().map(say))
-    .collect();
+    let words = [day.check.as_ref().map(length_words), day.measured.as_ref().map(measured_words)];
+    let words = words.into_iter().chain([day.robot.as_ref().map(robot_words)]);
+    let words: Vec<String> = words.flatten().collect();
     let content = html! {
         (page::verdict(tone, &headline, &numbers(day), &format!("{}.", words.join("; "))))
         (page::warnings(&day.breaks))
@@ -209,8 +207,8 @@ pub fn page(day: &Day) -> String {
         h2 { "3. The robot" }
         @match &day.robot { Some(robot) => (arm(robot)), None => p { "Not done: there is no identification.json." } }
         h2 { "Signatures" }
-        (page::table(&["", "name", "date", "signature"], &["measured by", "checked by", "released by"].map(|who| {
-            vec![who.to_owned(), "\u{2003}".repeat(10), "\u{2003}".repeat(6), "\u{2003}".repeat(12)]
+        (page::table(&["", "name", "date", "signature"], ["measured by", "checked by", "released by"].map(|who| {
+            [who.to_owned(), "\u{2003}".repeat(10), "\u{2003}".repeat(6), "\u{2003}".repeat(12)]
         })))
     };
     page::page("Calibration report", "Stereo rig, measurements and robot", &content)
@@ -222,8 +220,7 @@ fn rig(check: &Value) -> Markup {
     let nominal = ranges.into_iter().flatten().filter_map(|r| r.get("nominal_mm")?.as_f64());
     let (least, most) = nominal.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
     let [error, uncertainty, sum] = judged(check);
-    let up_to = check.pointer("/trusted_length_mm").and_then(Value::as_f64);
-    let up_to = up_to.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
+    let up_to = raw(check, "/trusted_length_mm").map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
     let trusted = format!("lengths{up_to} can be trusted to{}", trusted_by(check));
     let rows = [
         ("length measurement error E of the length where E + U is largest", error, "mm"),
@@ -240,7 +237,7 @@ fn rig(check: &Value) -> Markup {
     ];
     let second = check.get("second_board").is_some_and(|board| !board.is_null());
     html! {
-        (quantities(&rows))
+        (quantities(rows))
         p { (format!(
             "E is the absolute deviation of a length on the board, here of {lengths} lengths of {} to {} mm between its corners, on pairs that did not help to calibrate the \
              cameras that measured them. U is that of the calibration and of the board; what the corners at both ends scatter by is part of E. The verdict keeps U as \
@@ -265,7 +262,7 @@ fn measurements(measured: &Value) -> Markup {
         ("z", mm(measured, "/sigma_mm/2"), "mm"),
     ];
     html! {
-        (quantities(&rows))
+        (quantities(rows))
         p { "Compared with its calibration, the rig " (match text(measured, "/rig/state") { "agrees" => "agrees".to_owned(), other => format!("does not simply agree ({other})") }) "." }
         (page::warnings(&warnings(measured)))
     }
@@ -274,7 +271,7 @@ fn measurements(measured: &Value) -> Markup {
 fn arm(robot: &Value) -> Markup {
     let none = Value::Null;
     let (before, after) = (robot.pointer("/before").unwrap_or(&none), chosen(robot).unwrap_or(&none));
-    let row = |term: &str, pointer: &str| vec![term.to_owned(), mm(before, pointer), mm(after, pointer)];
+    let row = |term: &str, pointer: &str| [term.to_owned(), mm(before, pointer), mm(after, pointer)];
     let rows = [
         row("distance accuracy (AD): mean |error|, mm", "/verify/mean_abs_mm"),
         row("distance accuracy: largest |error|, mm", "/verify/max_abs_mm"),
@@ -287,7 +284,7 @@ fn arm(robot: &Value) -> Markup {
         _ => ("on verify poses, which took no part in the fit", "verify poses"),
     };
     html! {
-        (page::table(&[on, "before", "after"], &rows))
+        (page::table(&[on, "before", "after"], rows))
         p { (format!(
             "{} {poses}; {} kept; {} of {} parameters determined. To expect at other poses of the same range: {} mm on average, {} mm at 95 %.",
             count(after, "/verify/count"), text(robot, "/chosen"), count(robot, "/identifiability/rank"),
@@ -300,10 +297,9 @@ fn arm(robot: &Value) -> Markup {
     }
 }
 
-fn quantities(rows: &[(&str, String, &str)]) -> Markup {
-    let cells: Vec<Vec<String>> =
-        rows.iter().map(|(what, value, unit)| vec![(*what).to_owned(), value.clone(), (*unit).to_owned()]).collect();
-    page::table(&["quantity", "value", "unit"], &cells)
+fn quantities<const N: usize>(rows: [(&str, String, &str); N]) -> Markup {
+    let cells = rows.map(|(what, value, unit)| [what.to_owned(), value, unit.to_owned()]);
+    page::table(&["quantity", "value", "unit"], cells)
 }
 
 #[cfg(test)]

@@ -4,20 +4,17 @@ use std::f64::consts::TAU;
 
 use maud::{Markup, PreEscaped, html};
 
-use super::Result;
 use super::drawing::figure::Plot;
 use super::drawing::scene::{Ink, Scene};
 use super::page::{self, Tone};
-use super::rig;
 use super::table::{number, short};
+use super::{Result, rig};
 use crate::diagnostic::aligned;
 use crate::files::OutDir;
 use crate::formats::measure::MeasureFile;
 use crate::measurements::Role;
-use crate::stereo::board_pose::Shape;
-use crate::stereo::board_pose::TargetPose;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
-use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series};
+use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, TargetPose};
 
 /// Poses in the table of the worst.
 const WORST: usize = 10;
@@ -35,51 +32,35 @@ pub struct Thumbnail {
     pub jpeg_base64: String,
 }
 
-/// The distance of a pose to its group's centre.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Distance {
-    /// As the nominal robot was sent, mm.
-    pub commanded_mm: f64,
-    pub measured_mm: f64,
-}
-
 /// What the page shows beside the results.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Extras {
     /// The worst poses and all failures.
     pub thumbnails: Vec<Thumbnail>,
-    /// Distances to the centre; empty where no robot of so many joints is known.
-    pub distances: Vec<Distance>,
+    /// Distances to the group's centre as the nominal robot was sent, and what was measured beyond them, mm; empty where no robot of so many
+    /// joints is known.
+    pub distances: Vec<(f64, f64)>,
     /// What is said against the rig.
     pub doubts: Vec<String>,
 }
 
 /// The short text on stdout.
 pub fn summary(file: &MeasureFile, out: &OutDir) -> String {
-    format!(
-        "{}\nmeasurements: {}\nreport: {}\n",
-        headline(file),
-        out.join("measurements.csv"),
-        out.join("measure.html")
-    )
-}
-
-fn headline(file: &MeasureFile) -> String {
-    format!("{} of {} poses measured; {}", file.measured, file.poses, quality(file, |mm| number(mm, 4)))
+    let quality = quality(file, |mm| number(mm, 4));
+    let (points, page) = (out.join("measurements.csv"), out.join("measure.html"));
+    let MeasureFile { measured, poses, .. } = file;
+    format!("{measured} of {poses} poses measured; {quality}\nmeasurements: {points}\nreport: {page}\n")
 }
 
 /// How well the boards fit and the points are known; `mm` writes a length.
 fn quality(file: &MeasureFile, mm: fn(Option<f64>) -> String) -> String {
-    let along = |i: usize| mm(file.sigma_mm.map(|s| s[i]));
+    let [x, y, z] = [0, 1, 2].map(|i: usize| mm(file.sigma_mm.map(|s| s[i])));
     let usual = file.calibration_noise_px.map_or(String::new(), |px| format!(" ({px:.4} at the calibration)"));
     format!(
-        "residuals of the fitted target {} mm, {} px RMS; corners scatter by {} px{usual}; median sigma of its centre x {} y {} z {} mm",
+        "residuals of the fitted target {} mm, {} px RMS; corners scatter by {} px{usual}; median sigma of its centre x {x} y {y} z {z} mm",
         mm(file.fit_rms_mm),
         number(file.reprojection_rms_px, 3),
-        number(file.corner_noise_px, 4),
-        along(0),
-        along(1),
-        along(2),
+        number(file.corner_noise_px, 4)
     )
 }
 
@@ -103,23 +84,18 @@ fn tone(series: &Series, file: &MeasureFile, doubts: &[String]) -> Tone {
     }
 }
 
-/// The report.
 pub fn page(series: &Series, file: &MeasureFile, known: &Knowledge, extras: &Extras) -> Result<String> {
     let (poses, count) = (file.poses, file.measured);
     let measured = &series.poses;
-    let missing: Vec<Vec<String>> = measured
-        .iter()
-        .filter_map(|m| {
-            let refusal = m.target.as_ref().err()?;
-            Some(vec![m.at.pose.clone(), refusal.status.to_owned(), refusal.reason.clone()])
-        })
-        .collect();
+    let missing = measured.iter().filter_map(|m| Some((m, m.target.as_ref().err()?)));
+    let missing: Vec<[String; 3]> =
+        missing.map(|(m, refusal)| [m.at.pose.clone(), refusal.status.to_owned(), refusal.reason.clone()]).collect();
     let content = html! {
         (page::verdict(tone(series, file, &extras.doubts), &format!("{count} of {poses} poses measured"), &numbers(file), &format!("{}.", quality(file, short))))
         (page::warnings(&[extras.doubts.as_slice(), &file.warnings].concat()))
         @if !missing.is_empty() {
             h2 { "Poses without a measurement" }
-            (page::table(&["pose", "status", "why"], &missing))
+            (page::table(&["pose", "status", "why"], missing))
         }
         (thumbnails(&extras.thumbnails))
         @if count > 0 {
@@ -146,7 +122,7 @@ fn rig(measured: &[MeasuredPose]) -> Result<Markup> {
     let plot = |title: &str, (bars, limit): (Vec<(f64, f64, f64)>, f64)| {
         Plot::new(title, "pose, in the order of the run", "turn of the right camera, mdeg")
             .whole_x()
-            .error_bars("", &bars)
+            .error_bars("", bars)
             .hline(limit, "limit")
             .hline(-limit, "limit")
             .size(520, 340)
@@ -164,19 +140,19 @@ fn rig(measured: &[MeasuredPose]) -> Result<Markup> {
 }
 
 fn residuals(measured: &[MeasuredPose]) -> Result<Markup> {
-    let of = |figure: fn(&TargetPose) -> f64| -> Vec<(f64, f64)> {
-        measured.iter().enumerate().filter_map(|(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?)))).collect()
+    let of = |figure: fn(&TargetPose) -> f64| {
+        measured.iter().enumerate().filter_map(move |(i, m)| Some((i as f64, figure(m.target.as_ref().ok()?))))
     };
     let residual = Plot::new("Residual of every pose", "pose, in the order of the run", "RMS, px")
         .whole_x()
-        .points("", &of(|t| t.rms_px))
+        .points("", of(|t| t.rms_px))
         .size(520, 340)
         .svg()?;
     let sigma = Plot::new("Standard deviation of the mark point", "pose, in the order of the run", "mm")
         .whole_x()
-        .points("x", &of(|t| t.covariance[(3, 3)].sqrt()))
-        .points("y", &of(|t| t.covariance[(4, 4)].sqrt()))
-        .points("z", &of(|t| t.covariance[(5, 5)].sqrt()))
+        .points("x", of(|t| t.covariance[(3, 3)].sqrt()))
+        .points("y", of(|t| t.covariance[(4, 4)].sqrt()))
+        .points("z", of(|t| t.covariance[(5, 5)].sqrt()))
         .size(520, 340)
         .svg()?;
     Ok(html! {
@@ -199,13 +175,11 @@ fn worst_table(measured: &[MeasuredPose]) -> Markup {
     let sigma = |k: usize| column(&|t| Some(t.covariance[(k, k)].sqrt()));
     let lengths = [column(&|t| t.fit_rms_mm), sigma(3), sigma(4), sigma(5)];
     let row = |(k, (m, t)): (usize, &(&MeasuredPose, &TargetPose))| {
-        let mut row = vec![m.at.pose.clone(), m.at.group.clone()];
-        row.extend([number(Some(t.chi_square), 2), number(Some(t.rms_px), 4)]);
-        row.extend(lengths.iter().map(|column| column[k].clone()));
-        row.extend([t.corners.to_string(), t.outliers.to_string()]);
-        row
+        let residuals = [number(Some(t.chi_square), 2), number(Some(t.rms_px), 4)];
+        let lengths = lengths.each_ref().map(|column| column[k].clone());
+        let names = [m.at.pose.clone(), m.at.group.clone()].into_iter();
+        names.chain(residuals).chain(lengths).chain([t.corners, t.outliers].map(|count| count.to_string()))
     };
-    let rows: Vec<Vec<String>> = found.iter().enumerate().map(row).collect();
     let header = [
         "pose",
         "group",
@@ -218,7 +192,7 @@ fn worst_table(measured: &[MeasuredPose]) -> Markup {
         "corners",
         "outliers",
     ];
-    page::table(&header, &rows)
+    page::table(&header, found.iter().enumerate().map(row))
 }
 
 /// The target as a map of its crossings' deviations.
@@ -226,23 +200,15 @@ fn target(shape: &Shape, columns: usize) -> Result<Markup> {
     let largest = shape.deviations_mm.iter().map(|d| d.norm()).fold(1e-6, f64::max);
     // The largest arrow is as long as a square.
     let magnified = 1.0 / largest;
-    let arrows = |of: fn(&nalgebra::Vector3<f64>) -> [f64; 2]| -> Vec<[f64; 4]> {
-        let place = |k: usize| [(k % columns) as f64, (k / columns) as f64];
-        shape
-            .deviations_mm
-            .iter()
-            .enumerate()
-            .map(|(k, d)| {
-                let ([x, y], [dx, dy]) = (place(k), of(d));
-                [x, y, dx * magnified, dy * magnified]
-            })
-            .collect()
-    };
-    let map = |title: &str, arrows: &[[f64; 4]]| {
+    let map = |title: &str, of: fn(&nalgebra::Vector3<f64>) -> [f64; 2]| {
+        let arrows = shape.deviations_mm.iter().enumerate().map(|(k, d)| {
+            let [dx, dy] = of(d).map(|v| v * magnified);
+            [(k % columns) as f64, (k / columns) as f64, dx, dy]
+        });
         Plot::new(title, "column", "row").vectors("", arrows).equal_axes().y_down().size(460, 400).svg()
     };
-    let flat = map("Target: crossings in the plane", &arrows(|d| [d.x, d.y]))?;
-    let deep = map("Target: crossings out of the plane", &arrows(|d| [0.0, d.z]))?;
+    let flat = map("Target: crossings in the plane", |d| [d.x, d.y])?;
+    let deep = map("Target: crossings out of the plane", |d| [0.0, d.z])?;
     let said = format!(
         "An arrow as long as a square is {:.2} um. Crossings scatter by {:.2} um a coordinate in the plane and {:.2} um out of it; the \
          target is {:.1} ppm {} than its drawing, known to {:.1} ppm.",
@@ -277,19 +243,13 @@ fn in_space(measured: &[MeasuredPose], known: &Knowledge) -> Markup {
 
 /// Mark points of each group from three sides, with the sphere about the centre.
 fn places(measured: &[MeasuredPose]) -> Result<Markup> {
-    let mut groups: Vec<&str> = Vec::new();
-    for m in measured {
-        if !groups.contains(&m.at.group.as_str()) {
-            groups.push(&m.at.group);
+    let mut rows: Vec<(&str, Vec<String>)> = Vec::new();
+    for MeasuredPose { at, .. } in measured {
+        if rows.iter().all(|(group, _)| *group != at.group) {
+            let of_group: Vec<&MeasuredPose> = measured.iter().filter(|m| m.at.group == at.group).collect();
+            let views = [[0, 1], [0, 2], [2, 1]].into_iter().map(|axes| view(&of_group, axes));
+            rows.push((&at.group, views.collect::<Result<_>>()?));
         }
-    }
-    let mut rows = Vec::new();
-    for group in groups {
-        let of_group: Vec<&MeasuredPose> = measured.iter().filter(|m| m.at.group == group).collect();
-        rows.push((
-            group,
-            [[0, 1], [0, 2], [2, 1]].map(|axes| view(&of_group, axes)).into_iter().collect::<Result<Vec<_>>>()?,
-        ));
     }
     Ok(html! {
         h2 { "Mark points of each group" }
@@ -304,7 +264,7 @@ fn view(group: &[&MeasuredPose], [a, b]: [usize; 2]) -> Result<String> {
     const AXES: [&str; 3] = ["x, mm", "y, mm", "z, mm"];
     let at = |m: &&MeasuredPose| m.target.as_ref().ok().map(|t| t.cam_from_board.translation.vector);
     let center = group.iter().find(|m| m.at.role == Role::Center).and_then(at);
-    let points: Vec<(f64, f64)> = group.iter().filter_map(at).map(|p| (p[a], p[b])).collect();
+    let points = group.iter().filter_map(at).map(|p| (p[a], p[b]));
     let mut plot = Plot::new("", AXES[a], AXES[b]).equal_axes().size(330, 330);
     if b == 1 {
         plot = plot.y_down();
@@ -312,22 +272,19 @@ fn view(group: &[&MeasuredPose], [a, b]: [usize; 2]) -> Result<String> {
     if let Some(center) = center {
         let away = group.iter().filter(|m| m.at.role != Role::Center).filter_map(at).map(|p| (p - center).norm());
         let radius = crate::statistics::median(away).unwrap_or(0.0);
-        let circle: Vec<(f64, f64)> = (0..=72)
-            .map(|k| (f64::from(k) * TAU / 72.0).sin_cos())
-            .map(|(sin, cos)| (center[a] + radius * cos, center[b] + radius * sin))
-            .collect();
-        plot = plot.line("", &circle).points("", &[(center[a], center[b])]);
+        let turns = (0..=72).map(|k| (f64::from(k) * TAU / 72.0).sin_cos());
+        let circle = turns.map(|(sin, cos)| (center[a] + radius * cos, center[b] + radius * sin));
+        plot = plot.line("", circle).points("", [(center[a], center[b])]);
     }
-    plot.points("", &points).svg()
+    plot.points("", points).svg()
 }
 
-fn distances(distances: &[Distance]) -> Result<Markup> {
+fn distances(distances: &[(f64, f64)]) -> Result<Markup> {
     if distances.is_empty() {
         return Ok(html! {});
     }
-    let points: Vec<(f64, f64)> = distances.iter().map(|d| (d.commanded_mm, d.measured_mm - d.commanded_mm)).collect();
     let svg = Plot::new("Distance to the group's centre", "commanded, mm", "measured minus commanded, mm")
-        .points("", &points)
+        .points("", distances.iter().copied())
         .size(640, 340)
         .svg()?;
     Ok(html! {

@@ -1,6 +1,7 @@
 //! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only to turn a view in space.
 
 use super::drawing::script::SCRIPT;
+use crate::diagnostic::capital;
 use crate::files::provenance::{Digested, Provenance};
 use crate::files::{self, OutDir};
 use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
@@ -173,13 +174,14 @@ pub fn figure(svg: &str, caption: &str) -> Markup {
 }
 
 /// A table; numbers are aligned right, text left.
-pub fn table(header: &[&str], rows: &[Vec<String>]) -> Markup {
+pub fn table<R: IntoIterator<Item = String>>(header: &[&str], rows: impl IntoIterator<Item = R>) -> Markup {
+    let rows: Vec<Vec<String>> = rows.into_iter().map(|row| row.into_iter().collect()).collect();
     let columns = header.len().max(rows.iter().map(Vec::len).max().unwrap_or(0));
-    let class: Vec<Option<&str>> = (0..columns).map(|k| (k > 0 && holds_text(rows, k)).then_some("text")).collect();
+    let class: Vec<Option<&str>> = (0..columns).map(|k| (k > 0 && holds_text(&rows, k)).then_some("text")).collect();
     html! {
         div.wide { table {
             thead { tr { @for (cell, class) in header.iter().zip(&class) { th class=[class] { (cell) } } } }
-            tbody { @for row in rows { tr { @for (cell, class) in row.iter().zip(&class) { td class=[class] { (text(cell)) } } } } }
+            tbody { @for row in &rows { tr { @for (cell, class) in row.iter().zip(&class) { td class=[class] { (text(cell)) } } } } }
         } }
     }
 }
@@ -199,14 +201,8 @@ fn holds_text(rows: &[Vec<String>], column: usize) -> bool {
 }
 
 /// Warnings, where there are any.
-pub fn warnings(list: &[String]) -> Markup {
-    html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (text(warning)) } } } } }
-}
-
-/// A sentence with its first letter as a capital.
-pub fn capital(sentence: &str) -> String {
-    let mut chars = sentence.chars();
-    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
+pub fn warnings(list: &[impl AsRef<str>]) -> Markup {
+    html! { @if !list.is_empty() { ul.warnings { @for warning in list { li { (text(warning.as_ref())) } } } } }
 }
 
 /// A sentence of the terminal: what stands there between backticks is code here.
@@ -238,8 +234,7 @@ mod tests {
             ["03", "not seen", "", "moved", "", "3 of 12"],
             ["04", "+1.2, -3, 4", "ok", "moved", "", "-"],
         ];
-        let page =
-            table(&["", "a", "b", "c", "d", "e"], &rows.map(|row| row.map(str::to_owned).to_vec())).into_string();
+        let page = table(&["", "a", "b", "c", "d", "e"], rows.map(|row| row.map(str::to_owned))).into_string();
         for text in ["b", "c", "d"] {
             assert!(page.contains(&format!("<th class=\"text\">{text}</th>")), "{page}");
         }

@@ -3,10 +3,9 @@
 use maud::html;
 use nalgebra::{Point3, Vector3};
 
-use super::Result;
 use super::drawing::figure::Plot;
-use super::page;
 use super::table::{Table, number, short};
+use super::{Result, page};
 use crate::diagnostic::{count, two_digits};
 use crate::formats::plan::{Determined, Expected, PlanFile};
 use crate::measurements::Role;
@@ -55,15 +54,14 @@ pub fn summary(record: &PlanFile) -> String {
 }
 
 pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
-    let row = |e: &Expected| vec![e.poses.to_string(), two_digits(e.rms_mm)];
-    let rows: Vec<Vec<String>> = record.plan.expected.iter().map(row).collect();
+    let rows = record.plan.expected.iter().map(|e| [e.poses.to_string(), two_digits(e.rms_mm)]);
     let others: Vec<String> = record.warnings.iter().filter(|warning| *warning != COLLISIONS).cloned().collect();
     let content = html! {
         (page::verdict(page::Tone::Doubtful, "Collisions are not checked", &numbers(record, plan),
             "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
         (page::warnings(&others))
         h2 { "Accuracy to expect" }
-        (page::table(&["samples", "error, mm"], &rows))
+        (page::table(&["samples", "error, mm"], rows))
         p { "Root mean square of the target's position error that the identified parameters will leave over the spheres, tilts to 25 degrees, after one rigid fit; "
             (two_digits(record.noise_mm)) " mm noise a coordinate. The robot's own scatter (repeatability, and what the model lacks) comes on top: what "
             code { "identify" } " expects holds both, and its page tells them apart. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
@@ -73,7 +71,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         p { "One placement a group. Place the left camera so, base frame; a tenth of a metre and ten degrees off are taken up by " code { "plan --after" } " a few first poses." }
         (page::table(
             &["group", "left camera x, mm", "y, mm", "z, mm", "looks along x", "y", "z", "middle of the sphere x, mm", "y, mm", "z, mm"],
-            &plan.placements.iter().map(standing).collect::<Vec<_>>(),
+            plan.placements.iter().map(standing),
         ))
         h2 { "Where the target goes" }
         div.side { @for figure in sides(robot, plan)? { (figure) } }
@@ -104,21 +102,21 @@ fn numbers(record: &PlanFile, plan: &Plan) -> [(String, String); 3] {
 }
 
 /// A placement as somebody would set it up: where the left camera is, where it looks, and what it looks at.
-fn standing(placement: &Placement) -> Vec<String> {
+fn standing(placement: &Placement) -> impl Iterator<Item = String> + use<> {
     let base_from_left = placement.left_from_base.inverse();
     let along = base_from_left.rotation * Vector3::z();
     let lengths = |v: Vector3<f64>| [v.x, v.y, v.z].map(|c| format!("{:.0}", c + 0.0));
     let direction = [along.x, along.y, along.z].map(|c| format!("{:.3}", c + 0.0));
     let cells = [lengths(base_from_left.translation.vector), direction, lengths(placement.center_mm)];
-    std::iter::once(placement.name.clone()).chain(cells.into_iter().flatten()).collect()
+    std::iter::once(placement.name.clone()).chain(cells.into_iter().flatten())
 }
 
 fn curve(record: &PlanFile) -> Result<maud::Markup> {
-    let line = |d: &Determined| d.expected.iter().map(|e| (e.poses as f64, e.rms_mm)).collect::<Vec<_>>();
+    let line = |d: &Determined| -> Vec<_> { d.expected.iter().map(|e| (e.poses as f64, e.rms_mm)).collect() };
     let mut plot = Plot::new("Error by the number of poses", "samples", "error by the parameters, mm").log_y();
-    plot = plot.line("this plan", &line(&record.plan));
+    plot = plot.line("this plan", line(&record.plan));
     if let Some(paper) = &record.paper {
-        plot = plot.line("as planned by Shi et al.", &line(paper));
+        plot = plot.line("as planned by Shi et al.", line(paper));
     }
     let of_paper = match record.paper {
         Some(_) => " Shi et al. visit points on the same spheres with one orientation of the flange.",
@@ -153,7 +151,7 @@ fn sides(robot: &Robot, plan: &Plan) -> Result<Vec<maud::Markup>> {
             let of = plan.poses.iter().filter(|p| p.at.role == role);
             let points: Vec<_> = of.map(|p| flat(robot.target_mm(&p.at.joints_rad()).coords)).collect();
             if !points.is_empty() {
-                plot = plot.points(label, &points);
+                plot = plot.points(label, points);
             }
         }
         Ok(page::figure(
@@ -173,14 +171,11 @@ fn pictures(scene: &Scene, plan: &Plan) -> Result<Vec<maud::Markup>> {
         let camera = if left { scene.rig.left } else { scene.rig.right };
         let title = if left { "Left picture" } else { "Right picture" };
         let mut plot = Plot::new(title, "x, px", "y, px").equal_axes().y_down().size(460, 460);
-        plot = plot.x_range(0.0, f64::from(camera.width)).y_range(0.0, f64::from(camera.height));
+        plot = plot.ranges((0.0, f64::from(camera.width)), (0.0, f64::from(camera.height)));
         for pose in &plan.poses {
-            let outline: Vec<(f64, f64)> = corners
-                .iter()
-                .map(|&(x, y)| scene.rig.project(&(pose.left_from_target * Point3::new(x, y, 0.0))))
-                .map(|(l, r)| if left { (l.x, l.y) } else { (r.x, r.y) })
-                .collect();
-            plot = plot.line("", &outline);
+            let project = |(x, y)| scene.rig.project(&(pose.left_from_target * Point3::new(x, y, 0.0)));
+            let outline = corners.map(project).map(|(l, r)| if left { (l.x, l.y) } else { (r.x, r.y) });
+            plot = plot.line("", outline);
         }
         Ok(page::figure(
             &plot.svg()?,

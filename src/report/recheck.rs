@@ -128,28 +128,18 @@ pub fn page(
         (format!("{tolerance_mm} mm"), "tolerance"),
     ];
     let text = format!("{}. Next: {}.", sentence(recheck, standing, tolerance_mm, two_digits), next(standing, recheck));
-    let rows: Vec<Vec<String>> = recheck
-        .causes
-        .iter()
-        .map(|cause| {
-            let [amount, within] = changed(cause);
-            vec![
-                cause.words.clone(),
-                amount,
-                within,
-                two_digits(cause.effect_mm),
-                format!("{} {}", two_digits(cause.seen), cause.unit),
-                two_digits(cause.seen_mm),
-            ]
-        })
-        .collect();
+    let rows = recheck.causes.iter().map(|cause| {
+        let [amount, within] = changed(cause);
+        let [effect_mm, seen, seen_mm] = [cause.effect_mm, cause.seen, cause.seen_mm].map(two_digits);
+        [cause.words.clone(), amount, within, effect_mm, format!("{seen} {}", cause.unit), seen_mm]
+    });
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
         (page::warnings(warnings))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see. Of causes that move the same corners the same way \
              all show a change where one did." }
-        (page::table(&header("moves a length by, mm"), &rows))
+        (page::table(&header("moves a length by, mm"), rows))
         (history(checks, tolerance_mm, "Change of a length", "the calibration no longer holds, or pairs contradict it")?)
     };
     let lead =
@@ -172,13 +162,11 @@ pub(super) fn compared(found: usize, noun: &str, standing: Standing, [name, of_o
 
 /// The changes of all checks over their number; where nothing changed there is none. `beyond`: what a change above the tolerance means.
 pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str, beyond: &str) -> Result<Markup> {
-    let over = |of: fn(&Check) -> f64| -> Vec<(f64, f64)> {
-        checks.iter().enumerate().map(|(i, check)| ((i + 1) as f64, of(check))).collect()
-    };
+    let over = |of: fn(&Check) -> f64| checks.iter().enumerate().map(move |(i, check)| ((i + 1) as f64, of(check)));
     let svg = Plot::new(title, "check", "mm")
         .whole_x()
-        .points("changed by", &over(|check| check.effect_mm))
-        .points("would have been seen", &over(|check| check.seen_mm))
+        .points("changed by", over(|check| check.effect_mm))
+        .points("would have been seen", over(|check| check.seen_mm))
         .hline(tolerance_mm, "tolerance")
         .log_y()
         .svg()?;

@@ -39,10 +39,8 @@ pub fn doubt(file: &RectifiedFile) -> Option<String> {
 
 /// The lines on stdout.
 pub fn summary(file: &RectifiedFile, out: &OutDir) -> String {
-    let skipped = match file.pairs_skipped.len() {
-        0 => String::new(),
-        n => format!(", {n} skipped"),
-    };
+    let skipped = file.pairs_skipped.len();
+    let skipped = if skipped > 0 { format!(", {skipped} skipped") } else { String::new() };
     let what = if file.mode == "rectify" { "rectified" } else { "undistorted" };
     format!(
         "{} pairs {what}{skipped}, {}x{} px, in {}\n{}report: {}\n",
@@ -164,13 +162,12 @@ fn differences(file: &RectifiedFile, pair: &PairCorners) -> Result<Markup> {
         return Ok(html! {});
     }
     let scale = LONGEST_ARROW * f64::from(file.width) / most;
-    let arrow = |&(at, d): &(nalgebra::Point2<f64>, f64)| {
+    let arrows = found.iter().map(|(at, d)| {
         let (dx, dy) = if in_columns { (d * scale, 0.0) } else { (0.0, d * scale) };
         [at.x, at.y, dx, dy]
-    };
-    let arrows: Vec<[f64; 4]> = found.iter().map(arrow).collect();
+    });
     let svg = Plot::new(&format!("Pair {}: differences of the corners", pair.pair), "x, px", "y, px")
-        .vectors("", &arrows)
+        .vectors("", arrows)
         .equal_axes()
         .y_down()
         .svg()?;
@@ -182,17 +179,10 @@ fn differences(file: &RectifiedFile, pair: &PairCorners) -> Result<Markup> {
 }
 
 fn pairs(pairs: &[RectifiedPair]) -> Markup {
-    let rows: Vec<Vec<String>> = pairs
-        .iter()
-        .map(|p| {
-            let of = |value: Option<f64>| number(value, 3);
-            vec![
-                p.pair.clone(),
-                p.residual.map_or_else(|| "-".to_owned(), |r| r.corners.to_string()),
-                of(p.residual.map(|r| r.rms_px)),
-                of(p.residual.map(|r| r.max_px)),
-            ]
-        })
-        .collect();
-    page::table(&["pair", "corners", "RMS, px", "largest, px"], &rows)
+    let rows = pairs.iter().map(|p| {
+        let corners = p.residual.map_or_else(|| "-".to_owned(), |r| r.corners.to_string());
+        let [rms, most] = [p.residual.map(|r| r.rms_px), p.residual.map(|r| r.max_px)].map(|px| number(px, 3));
+        [p.pair.clone(), corners, rms, most]
+    });
+    page::table(&["pair", "corners", "RMS, px", "largest, px"], rows)
 }

@@ -15,8 +15,10 @@ pub fn cameras(scene: &mut Scene, rig: &Rig, depth_mm: f64) {
         [("left", &rig.left, Transform::identity()), ("right", &rig.right, left_from_right)]
     {
         let tip = left_from_camera * Point3::origin();
-        let corners: Vec<Point3<f64>> =
-            field(camera).into_iter().map(|ray| left_from_camera * (ray * depth_mm)).collect();
+        let (right, bottom) = (f64::from(camera.width) - 0.5, f64::from(camera.height) - 0.5);
+        let corners = [[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
+        let rays = rays(camera, &corners).into_iter();
+        let corners: Vec<Point3<f64>> = rays.map(|ray| left_from_camera * (ray * depth_mm)).collect();
         let ring: Vec<Point3<f64>> = corners.iter().copied().chain(corners.first().copied()).collect();
         scene.line(Ink::Frame, ring);
         for corner in corners {
@@ -26,11 +28,10 @@ pub fn cameras(scene: &mut Scene, rig: &Rig, depth_mm: f64) {
     }
 }
 
-/// Rays through the corners of a picture, at depth one.
-fn field(camera: &Camera) -> Vec<Point3<f64>> {
-    let (right, bottom) = (f64::from(camera.width) - 0.5, f64::from(camera.height) - 0.5);
-    let corners = [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)].map(|(x, y)| Point2::new(x, y));
-    corners.iter().filter_map(|px| camera.undistort(px)).map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect()
+/// Rays through places of a picture, at depth one.
+fn rays(camera: &Camera, px: &[[f64; 2]]) -> Vec<Point3<f64>> {
+    let rays = px.iter().filter_map(|[x, y]| camera.undistort(&Point2::new(*x, *y)));
+    rays.map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect()
 }
 
 /// Where a verdict holds: the outline of the corners in the left picture at the nearest and at the farthest depth.
@@ -38,8 +39,7 @@ pub fn volume(scene: &mut Scene, left: &Camera, volume: &Volume) {
     /// Lines that join the two outlines.
     const JOINING: usize = 8;
     let outline: Vec<[f64; 2]> = volume.left_px.clone().into();
-    let rays = outline.iter().filter_map(|[x, y]| left.undistort(&Point2::new(*x, *y)));
-    let rays: Vec<Point3<f64>> = rays.map(|ray| Point3::new(ray.x, ray.y, 1.0)).collect();
+    let rays = rays(left, &outline);
     let [near, far] = volume.depth_mm;
     for depth in [near, far] {
         scene.line(Ink::Frame, rays.iter().chain(rays.first()).map(|ray| ray * depth).collect());

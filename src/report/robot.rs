@@ -45,8 +45,7 @@ pub fn chain(robot: &Robot) -> String {
             true => format!("{low:.1} to {high:.1} mm"),
             false => format!("{:.1} to {:.1}", low.to_degrees(), high.to_degrees()),
         });
-        let angles = [j.alpha_rad, j.beta_rad, j.theta_rad].map(|a| number(a.to_degrees()));
-        let [alpha, beta, theta] = angles;
+        let [alpha, beta, theta] = [j.alpha_rad, j.beta_rad, j.theta_rad].map(|a| number(a.to_degrees()));
         table.row([format!("{}", i + 1), alpha, number(j.a_mm), beta, theta, number(j.d_mm), range]);
     }
     let _ = write!(text, "{table}");
@@ -76,20 +75,12 @@ fn corrections(robot: &Robot) -> Vec<String> {
         LoadPoint::Tool => "the target".to_owned(),
     };
     let sag = terms.gravity.iter().map(|t| {
-        format!(
-            "sag: joint {} turns {} mrad a metre of lever of a weight at {}",
-            t.joint + 1,
-            number(t.k_rad_per_m),
-            at(t.point)
-        )
+        let (joint, k, at) = (t.joint + 1, number(t.k_rad_per_m), at(t.point));
+        format!("sag: joint {joint} turns {k} mrad a metre of lever of a weight at {at}")
     });
     let bending = terms.bending.iter().map(|t| {
-        format!(
-            "bending: across its axis joint {} yields {} mrad a metre of lever of a weight at {}",
-            t.joint + 1,
-            number(t.k_rad_per_m),
-            at(t.point)
-        )
+        let (joint, k, at) = (t.joint + 1, number(t.k_rad_per_m), at(t.point));
+        format!("bending: across its axis joint {joint} yields {k} mrad a metre of lever of a weight at {at}")
     });
     let wave = |wave: Wave| match wave {
         Wave::Sin => "sin q",
@@ -98,12 +89,8 @@ fn corrections(robot: &Robot) -> Vec<String> {
         Wave::Cos2 => "cos 2q",
     };
     let harmonics = terms.harmonics.iter().map(|t| {
-        format!(
-            "harmonic: {} mrad {} is added to joint {}'s reading",
-            number(t.amplitude_rad),
-            wave(t.wave),
-            t.joint + 1
-        )
+        let (amplitude, wave, joint) = (number(t.amplitude_rad), wave(t.wave), t.joint + 1);
+        format!("harmonic: {amplitude} mrad {wave} is added to joint {joint}'s reading")
     });
     let wobble = terms.wobble.iter().map(|t| {
         format!("wobble: the axis of joint {} tilts by {} mrad {}", t.joint + 1, number(t.amplitude_rad), wave(t.wave))
@@ -126,14 +113,10 @@ fn sentence(index: usize, joint: &Joint) -> String {
             if square { format!("square to {before}") } else { format!("{angle:.3} deg from {before}") }
         }
     };
-    let offset = match joint.a_mm.abs() > NO_LENGTH_MM {
-        true => format!(", {:.3} mm off it", joint.a_mm.abs()),
-        false => String::new(),
-    };
-    let along = match joint.d_mm.abs() > NO_LENGTH_MM {
-        true => format!("; the next part starts {:.3} mm along it", joint.d_mm),
-        false => String::new(),
-    };
+    let (a_mm, d_mm) = (joint.a_mm.abs(), joint.d_mm);
+    let offset = if a_mm > NO_LENGTH_MM { format!(", {a_mm:.3} mm off it") } else { String::new() };
+    let starts = || format!("; the next part starts {d_mm:.3} mm along it");
+    let along = if d_mm.abs() > NO_LENGTH_MM { starts() } else { String::new() };
     let kind = if joint.slides { "slides along an axis" } else { "turns about an axis" };
     let sign = if joint.sign < 0.0 { ", counted against it" } else { "" };
     format!("{kind} {lean}{offset}{sign}{along}")
@@ -162,19 +145,13 @@ pub fn pose(robot: &Robot, joints_deg: &[f64]) -> String {
     );
     let q = flange.rotation.quaternion();
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };
-    let _ = writeln!(
-        text,
-        "  quaternion           w {:.6}  x {:.6}  y {:.6}  z {:.6}",
-        sign * q.w,
-        sign * q.i + 0.0,
-        sign * q.j + 0.0,
-        sign * q.k + 0.0
-    );
+    let (w, [x, y, z]) = (sign * q.w, [q.i, q.j, q.k].map(|v| sign * v + 0.0));
+    let _ = writeln!(text, "  quaternion           w {w:.6}  x {x:.6}  y {y:.6}  z {z:.6}");
     let _ = writeln!(text, "target   {}", place(tool.coords));
-    let past = robot.joints.iter().zip(&joints).enumerate().filter_map(|(i, (joint, q))| {
-        let (low, high) = joint.limits_rad?;
-        (*q < low || *q > high).then(|| format!("joint {} is outside of its range", i + 1))
-    });
-    past.for_each(|line| text += &format!("{line}\n"));
+    for (i, (joint, q)) in robot.joints.iter().zip(&joints).enumerate() {
+        if joint.limits_rad.is_some_and(|(low, high)| *q < low || *q > high) {
+            let _ = writeln!(text, "joint {} is outside of its range", i + 1);
+        }
+    }
     text
 }

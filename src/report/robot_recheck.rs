@@ -2,10 +2,9 @@
 
 use maud::html;
 
-use super::Result;
-use super::page;
 use super::recheck::{compared, header, history, tone, word};
 use super::table::{Table, number, with_sigma};
+use super::{Result, page};
 use crate::diagnostic::{count, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
@@ -135,8 +134,7 @@ fn lines(recheck: &Recheck) -> Table {
             table.row([what, "not seen".to_owned()]);
             continue;
         };
-        let seen = [cause.seen, cause.seen_mm].map(|value| value.map_or_else(String::new, four));
-        let [seen, seen_mm] = seen;
+        let [seen, seen_mm] = [cause.seen, cause.seen_mm].map(|value| value.map_or_else(String::new, four));
         let by = format!("{} +- {}", four(amount), four(2.0 * sigma));
         table.row([what, by, cause.unit.to_owned(), four(cause.effect_mm), seen, seen_mm]);
     }
@@ -176,14 +174,13 @@ pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[Str
         true => ("once the cameras' place was found anew", "cameras that moved"),
         false => ("once the instrument's place was found anew", "an instrument that moved"),
     };
-    let rows: Vec<Vec<String>> = cells(recheck).into_iter().map(|row| row.to_vec()).collect();
     let content = html! {
         (page::verdict(tone(standing), word(standing), &numbers, &text))
         (page::warnings(warnings))
         h2 { "What may have changed" }
         p { "Each cause by itself, and the smallest change of it that nineteen of twenty such checks see; mm at the pose where it moves the target most, \
              " (sensor) ". The zero of joint 1 is seen as " (moved) "." }
-        (page::table(&header("moves the target by, mm"), &rows))
+        (page::table(&header("moves the target by, mm"), cells(recheck)))
         (history(checks, tolerance_mm, "Movement of the target", "the robot is no longer the identified one")?)
     };
     let names = ["the identified robot", "the robot that was identified from them"];

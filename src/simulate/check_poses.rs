@@ -5,7 +5,6 @@ use nalgebra::{UnitQuaternion, Vector3};
 use super::Error;
 use super::draws::{Draws, Purpose};
 use super::physical_board::PhysicalBoard;
-use super::rig::left_from_field;
 use crate::geometry::{Transform, transform};
 use crate::imaging::Board;
 use crate::stereo::Rig;
@@ -46,11 +45,6 @@ const BORDER: f64 = 0.004;
 /// True where the whole plate is inside both pictures.
 pub fn seen_by_both(rig: &Rig, board: &PhysicalBoard, left_from_board: &Transform) -> bool {
     rig.sees_plate(left_from_board, board.plate_half_mm(), BORDER)
-}
-
-/// `left_from_board` of each pair of the presets' rig.
-pub fn poses(rig: &Rig, board: &PhysicalBoard, count: usize, seed: u64) -> Result<Vec<Transform>, Error> {
-    held(rig, &left_from_field(), board, &Holding::USUAL, count, seed)
 }
 
 /// `left_from_board` of each pair, the boards held in a field before a rig; each wholly inside both pictures.

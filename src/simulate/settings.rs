@@ -6,8 +6,7 @@ use super::physical_board::Workmanship;
 use super::picture::psf::Optics;
 use super::picture::scene::Print;
 use super::picture::sensor::{Lighting, Sensor};
-use crate::imaging::Board;
-use crate::imaging::Squares;
+use crate::imaging::{Board, Squares};
 
 /// How the flange is turned along the poses of a group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]

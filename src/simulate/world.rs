@@ -5,8 +5,7 @@ use image::{ExtendedColorType, ImageEncoder};
 use nalgebra::{Point2, Point3, Vector3};
 use rayon::prelude::*;
 
-use super::check_poses;
-use super::clutter;
+use super::check_poses::{Holding, held};
 use super::draws::{Draws, NormalTable, Purpose};
 use super::physical_board::PhysicalBoard;
 use super::picture::backdrop::Backdrop;
@@ -14,10 +13,10 @@ use super::picture::patch::Patch;
 use super::picture::render::{Picture, Renderer};
 use super::picture::scene::Scene;
 use super::picture::sensor::Lighting;
-use super::rig::true_rig;
+use super::rig::{left_from_field, true_rig};
 use super::robot_poses::{self, Arm, TruePose};
 use super::settings::Settings;
-use super::{Error, Result, true_robot};
+use super::{Error, Result, clutter, true_robot};
 use crate::files::{OutDir, is_temporary};
 use crate::geometry::Transform;
 use crate::imaging::{Corner, Corners, PairCorners, corners::Side};
@@ -74,7 +73,8 @@ impl World {
             return Err(Error::Joints { found: truth.joints.len(), needed: nominal.joints.len() });
         }
         let arm = Arm { nominal, truth };
-        let check_poses = check_poses::poses(&rig, &check_board, settings.check_pairs, settings.seed)?;
+        let (count, seed) = (settings.check_pairs, settings.seed);
+        let check_poses = held(&rig, &left_from_field(), &check_board, &Holding::USUAL, count, seed)?;
         let poses = robot_poses::plan(&settings, &arm, &rig, &target)?;
         Ok(World { settings, rig, check_board, target, check_poses, arm, poses })
     }

@@ -38,7 +38,6 @@ use crate::stereo::select::options::Options;
 use crate::stereo::volume;
 use crate::{progress, ranges, report};
 
-/// Runs the command.
 pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return super::recheck::run(args, against, config, run);
@@ -69,10 +68,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
     let mut judged = Judged::new(&calibration, findings, accuracy, standards, &demand);
     if args.lens.is_some() && judged.verdict != Verdict::Pass {
-        judged.advice.insert(
-            0,
-            "leave `--lens` away: the lens is then the one that best predicts pairs it has not seen".to_owned(),
-        );
+        let other = "leave `--lens` away: the lens is then the one that best predicts pairs it has not seen";
+        judged.advice.insert(0, other.to_owned());
     }
     calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 

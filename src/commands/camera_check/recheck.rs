@@ -26,7 +26,6 @@ use crate::{progress, ranges, report};
 const HINT: &str = "`--against` takes the calibration.json that `stereocal camera-check IMAGES` wrote; whether a robot is still the identified one is asked by \
                     `stereocal verify --against out/identified.toml --measurements FILE`";
 
-/// Runs the command.
 pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let run = Run { force: args.output.force, ..run };
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;

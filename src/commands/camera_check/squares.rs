@@ -2,11 +2,10 @@
 
 use super::super::Result;
 use crate::cli::{AskedSquares, CameraCheck};
-use crate::config;
 use crate::imaging::Squares;
 use crate::imaging::count::{Counted, count_squares};
 use crate::imaging::input::pairs::Pairing;
-use crate::progress;
+use crate::{config, progress};
 
 /// The squares that were said, or that the pictures show where they are to be counted.
 pub fn squares(args: &CameraCheck, pairing: Option<&Pairing>) -> Result<Option<Squares>> {

@@ -4,13 +4,11 @@ use camino::Utf8Path;
 
 use super::super::Result;
 use crate::compensate::Target;
-use crate::config;
-use crate::files;
 use crate::files::provenance::{Digested, Provenance};
 use crate::formats::targets::Row;
 use crate::programs::{Language, unread};
-use crate::progress;
 use crate::robot::{Robot, file};
+use crate::{config, files, progress};
 
 /// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them, or in one
 /// of these folders, where they are a copy.

@@ -22,7 +22,6 @@ use pair::Pair;
 use program::Program;
 use told::{Summary, said};
 
-/// Runs the command.
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let results = args.output.out.as_deref().unwrap_or(&config.out);
     doubts::refuse_corrected(&args.targets, &[results, args.identified.parent().unwrap_or(Utf8Path::new(""))])?;

@@ -5,13 +5,12 @@ use nalgebra::{Point3, Vector3};
 
 use super::super::Result;
 use crate::cli::Compensate;
-use crate::config;
 use crate::formats::robots::known;
 use crate::identify::record;
-use crate::progress;
 use crate::robot::refit::Residual;
 use crate::robot::tool_fit::{Start, TYPED_MM};
 use crate::robot::{Advice, Check, Error, Joint, Robot, file, inverse, tool_text};
+use crate::{config, progress};
 
 /// Robots and tools that differ by less are the same, mm.
 const SAME_MM: f64 = 1e-6;
@@ -91,19 +90,16 @@ impl Pair {
         if drawn == found {
             return 0.0;
         }
-        let lacks = |without, with, tool_mm: Vector3<f64>| {
-            let tool = tool_text(&tool_mm.into());
-            format!(
-                "{without} states no tool: that of {with}, {tool} mm, is taken for both; `--tool X,Y,Z` names another"
-            )
-        };
         if drawn == Vector3::zeros() || found == Vector3::zeros() {
-            let of_found = drawn == Vector3::zeros();
-            self.tool_mm = Some(if of_found { found } else { drawn });
-            self.of_tools = Some(match of_found {
-                true => lacks(&args.robot, &args.identified, found),
-                false => lacks(&args.identified, &args.robot, drawn),
-            });
+            let (without, with, tool_mm) = match drawn == Vector3::zeros() {
+                true => (&args.robot, &args.identified, found),
+                false => (&args.identified, &args.robot, drawn),
+            };
+            let tool = tool_text(&tool_mm.into());
+            self.tool_mm = Some(tool_mm);
+            self.of_tools = Some(format!(
+                "{without} states no tool: that of {with}, {tool} mm, is taken for both; `--tool X,Y,Z` names another"
+            ));
             return 0.0;
         }
         let apart_mm = (drawn - found).norm();

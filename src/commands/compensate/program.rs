@@ -3,6 +3,7 @@
 use crate::cli::Compensate;
 use crate::compensate::{Compensated, Target};
 use crate::csv_table::MOST_ROWS;
+use crate::diagnostic::count;
 use crate::files;
 use crate::formats::targets::{self, Row};
 use crate::programs::{self, Cause, Encoding, Instruction, JointOrder, Joints, Language};
@@ -115,6 +116,5 @@ impl Program {
 /// "7 motions, 2 through joint targets; line 14: MoveL p10 is Cartesian".
 fn counted(motions: &[Instruction], first: &Instruction) -> String {
     let through = motions.iter().filter(|m| m.moves_by.is_ok()).count();
-    let s = if motions.len() == 1 { "" } else { "s" };
-    format!("{} motion{s}, {through} through joint targets; {first}", motions.len())
+    format!("{}, {through} through joint targets; {first}", count(motions.len(), "motion"))
 }

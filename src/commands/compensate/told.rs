@@ -79,9 +79,7 @@ impl Summary {
             motions: motions.map(|motions| motions.iter().map(Moved::new).collect()),
         }
     }
-}
 
-impl Summary {
     /// Whether nothing was left as it is.
     pub(super) fn is_whole(&self) -> bool {
         let all = |motions: &Vec<Moved>| !motions.is_empty() && motions.iter().all(|m| m.reason.is_none());
@@ -130,10 +128,8 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
         );
     }
     pair.of_tools.iter().for_each(|said| text += &format!("{said}\n"));
-    let left: Vec<String> = match motions {
-        Some(motions) => motions.iter().filter(|m| m.moves_by.is_err()).map(|m| format!("left: {m}")).collect(),
-        None => Vec::new(),
-    };
+    let left = motions.into_iter().flatten().filter(|m| m.moves_by.is_err());
+    let left: Vec<String> = left.map(|m| format!("left: {m}")).collect();
     // Of a program's target the motion to it says why.
     let is_said = |r: &&Refused| left.iter().any(|motion| motion.ends_with(&r.reason));
     let refused: Vec<&Refused> = summary.refused.iter().filter(|r| !is_said(r)).collect();

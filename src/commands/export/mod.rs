@@ -5,16 +5,14 @@ mod robot;
 
 use super::heed::heed_rig;
 use super::{Outcome, Result};
-use crate::cli::{CalibrationFormat, Export, ExportCalibration, ExportWhat};
+use crate::cli::{CalibrationFormat, ExportCalibration, ExportWhat};
 use crate::config::Config;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::calibration as rig;
-use crate::formats::export;
+use crate::formats::{calibration as rig, export};
 
-/// Runs the command.
-pub fn run(args: &Export, config: &Config, run: Run) -> Result<Outcome> {
-    match &args.what {
+pub fn run(what: &ExportWhat, config: &Config, run: Run) -> Result<Outcome> {
+    match what {
         ExportWhat::Calibration(args) => calibration(args, config, run),
         ExportWhat::Robot(args) => robot::run(args, config, run),
         ExportWhat::Placement(args) => placement::run(args, config, run),

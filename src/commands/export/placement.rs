@@ -9,7 +9,6 @@ use crate::files::provenance::Run;
 use crate::formats::placements::record::{GroupRecord, PLACEMENT, PlacementFile};
 use crate::formats::placements::{Frames, Placement, plain};
 
-/// Runs the command.
 pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let path = args.placement.clone().unwrap_or_else(|| out.or_usual(PLACEMENT, &config.out));
@@ -47,16 +46,14 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
         stdout.push_str(&format!("{}\n", out.join(&name)));
     }
     let unit = if args.format == PlacementFormat::Opencv { "mm" } else { "m" };
-    let target = match flange_from_target {
-        Some(_) => format!(", and {} from {}", args.flange_frame, args.target_frame),
-        None => String::new(),
+    let (target, note) = match flange_from_target {
+        Some(_) => (format!(", and {} from {}", args.flange_frame, args.target_frame), String::new()),
+        None => (
+            String::new(),
+            format!("note: the target's turn on the flange is not known: only the {sensor}'s place is in the file\n"),
+        ),
     };
-    stdout.push_str(&format!("{} from {camera_frame}{target}, in {unit}\n", args.base_frame));
-    if flange_from_target.is_none() {
-        let only =
-            format!("note: the target's turn on the flange is not known: only the {sensor}'s place is in the file\n");
-        stdout.push_str(&only);
-    }
+    stdout.push_str(&format!("{} from {camera_frame}{target}, in {unit}\n{note}", args.base_frame));
     Ok(Outcome { stdout, status })
 }
 

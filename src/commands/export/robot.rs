@@ -8,10 +8,10 @@ use crate::cli::{ExportRobot, RobotFormat};
 use crate::config::Config;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::robots::dh_csv;
-use crate::formats::robots::known;
 use crate::formats::robots::urdf::Urdf;
-use crate::formats::robots::{ExportedRobot, ros_kinematics, ur_calibration, urdf_corrected, urdf_plain};
+use crate::formats::robots::{
+    ExportedRobot, dh_csv, known, ros_kinematics, ur_calibration, urdf_corrected, urdf_plain,
+};
 use crate::geometry::Transform;
 use crate::robot::refit::Residual;
 use crate::robot::{Check, Error, Robot, axes, catalogue, file, tool_text};
@@ -19,7 +19,6 @@ use crate::robot::{Check, Error, Robot, axes, catalogue, file, tool_text};
 /// Deviations below this are rounding, mm: common normals of nearly parallel axes lose half the digits.
 const ROUNDING_MM: f64 = 1e-4;
 
-/// Runs the command.
 pub fn run(args: &ExportRobot, config: &Config, run: Run) -> Result<Outcome> {
     let path = args.robot.clone().unwrap_or_else(|| config.out.join(file::IDENTIFIED_FILE));
     let (robot, check) = file::read_checked(&path)?;
@@ -187,14 +186,12 @@ fn fidelity(identified: &Identified, carried: &Robot) -> String {
         ("couplings", !robot.corrections.couplings.is_empty() && carried.corrections.couplings.is_empty()),
     ];
     let lost: Vec<&str> = terms.iter().filter(|(_, lost)| *lost).map(|(name, _)| *name).collect();
-    let why = if lost.is_empty() {
-        "the format has no place for all of the robot's constants".to_owned()
-    } else {
-        format!("the format has no place for {}: refitted over {over}", lost.join(" and "))
-    };
-    let hint = match lost.is_empty() {
-        true => "",
-        false => "\nhint: `identify --extensions none` finds the constants that this format can hold",
+    let (why, hint) = match lost.is_empty() {
+        true => ("the format has no place for all of the robot's constants".to_owned(), ""),
+        false => (
+            format!("the format has no place for {}: refitted over {over}", lost.join(" and ")),
+            "\nhint: `identify --extensions none` finds the constants that this format can hold",
+        ),
     };
     format!(
         "{why}; remaining error: {:.4} mm on average, {:.4} mm and {:.4} mrad at most{hint}",

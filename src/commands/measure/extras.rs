@@ -10,7 +10,7 @@ use crate::imaging::input::pairs::PairFiles;
 use crate::imaging::{Corners, PairCorners, Wanted, find, overlay};
 use crate::measurements::{Measurement, Observed, Role};
 use crate::report::drawing::picture::PairJpeg;
-use crate::report::measure::{Distance, Thumbnail};
+use crate::report::measure::Thumbnail;
 use crate::robot::{self, Robot};
 use crate::stereo::board_pose::{MeasuredPose, Series};
 
@@ -60,7 +60,7 @@ pub(super) fn thumbnails(
 
 fn sent() -> Result<Robot> {
     let file = Utf8Path::new(ROBOT);
-    if file.is_file() { Ok(robot::file::read(file)?) } else { Ok(Robot::paper()) }
+    Ok(if file.is_file() { robot::file::read(file)? } else { Robot::paper() })
 }
 
 /// Where pictures and joint angles do not belong together, by the robot that was sent.
@@ -86,8 +86,8 @@ pub(super) fn shifted(series: &Series) -> Result<Option<String>> {
     Ok(shifted::find(&set, &robot).map(said))
 }
 
-/// Distances to each group's centre, where a robot of so many joints is known.
-pub(super) fn distances(series: &Series) -> Result<Vec<Distance>> {
+/// Distances to each group's centre as commanded and what was measured beyond them, mm, where a robot of so many joints is known.
+pub(super) fn distances(series: &Series) -> Result<Vec<(f64, f64)>> {
     let robot = sent()?;
     if series.poses.iter().any(|m| m.at.joints_deg.len() != robot.joints.len()) {
         return Ok(Vec::new());
@@ -98,7 +98,7 @@ pub(super) fn distances(series: &Series) -> Result<Vec<Distance>> {
         let at = |m: &MeasuredPose| m.target.as_ref().ok().map(|t| t.cam_from_board.translation.vector);
         let measured_mm = (at(m)? - at(center)?).norm();
         let commanded_mm = (robot.target_mm(&m.at.joints_rad()) - robot.target_mm(&center.at.joints_rad())).norm();
-        (m.at.role != Role::Center).then_some(Distance { commanded_mm, measured_mm })
+        (m.at.role != Role::Center).then_some((commanded_mm, measured_mm - commanded_mm))
     };
     Ok(series.poses.iter().filter_map(of).collect())
 }

@@ -22,13 +22,10 @@ use crate::imaging::input::pairs::Source;
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::report::measure::Extras;
-use crate::stereo;
-use crate::stereo::board_pose::series;
-use crate::stereo::board_pose::{Knowledge, Refusal, Seen, Series};
+use crate::stereo::board_pose::{Knowledge, Refusal, Seen, Series, series};
 use crate::stereo::pairs::open_numbers;
-use crate::{progress, report};
+use crate::{progress, report, stereo};
 
-/// Runs the command.
 pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
@@ -165,22 +162,22 @@ fn numbers_without_zeros<'a>(poses: &[RobotPose], pictures: impl Iterator<Item =
 
 /// What a person should know, on stderr.
 fn say(series: &Series, file: &MeasureFile) {
-    if !series.judgement.ends_the_run() {
-        let mut causes: Vec<(&str, Vec<String>)> = Vec::new();
-        for pose in &series.poses {
-            let Err(Refusal { reason, .. }) = &pose.target else { continue };
-            match causes.iter_mut().find(|(cause, _)| cause == reason) {
-                Some((_, names)) => names.push(pose.at.pose.clone()),
-                None => causes.push((reason, vec![pose.at.pose.clone()])),
-            }
-        }
-        for (reason, names) in causes {
-            let are = if names.len() == 1 { "pose" } else { "poses" };
-            let is = if names.len() == 1 { "is" } else { "are" };
-            progress::warn(format!("{are} {} {is} not measured: {reason}", named(&names)));
-        }
-        file.warnings.iter().for_each(progress::warn);
+    if series.judgement.ends_the_run() {
+        return;
     }
+    let mut causes: Vec<(&str, Vec<String>)> = Vec::new();
+    for pose in &series.poses {
+        let Err(Refusal { reason, .. }) = &pose.target else { continue };
+        match causes.iter_mut().find(|(cause, _)| cause == reason) {
+            Some((_, names)) => names.push(pose.at.pose.clone()),
+            None => causes.push((reason, vec![pose.at.pose.clone()])),
+        }
+    }
+    for (reason, names) in causes {
+        let (poses, are) = if names.len() == 1 { ("pose", "is") } else { ("poses", "are") };
+        progress::warn(format!("{poses} {} {are} not measured: {reason}", named(&names)));
+    }
+    file.warnings.iter().for_each(progress::warn);
 }
 
 /// A rig that is not the calibrated one, or not one measured pose, is the end of the run; the files say so as well.
@@ -188,11 +185,8 @@ fn end(series: &Series, known: &Knowledge, out: &OutDir) -> Result<()> {
     let judgement = &series.judgement;
     let measured = series.poses.iter().filter(|pose| pose.target.is_ok()).count();
     if let (true, Some(statement)) = (judgement.ends_the_run(), judgement.describe(&known.rig, &known.board)) {
-        let kept = if measured > 0 {
-            format!("; {} before that: {}", count(measured, "measured pose"), out.join("measurements.csv"))
-        } else {
-            String::new()
-        };
+        let before = || format!("; {} before that: {}", count(measured, "measured pose"), out.join("measurements.csv"));
+        let kept = if measured > 0 { before() } else { String::new() };
         let hint = judgement.hint(&known.rig).unwrap_or_default();
         return Err(stereo::Error::RigChanged { statement: statement + &kept, hint }.into());
     }

@@ -18,8 +18,7 @@ use crate::imaging::input::pairs::{PairFiles, Source};
 use crate::imaging::{PairCorners, Wanted, find};
 use crate::measurements::RobotPose;
 use crate::progress;
-use crate::stereo::board_pose::series;
-use crate::stereo::board_pose::{Knowledge, Refusal, Seen};
+use crate::stereo::board_pose::{Knowledge, Refusal, Seen, series};
 
 /// Time between two looks into the folder.
 const BETWEEN_LOOKS: Duration = Duration::from_millis(300);
@@ -97,26 +96,20 @@ fn look(source: &Source<'_>, out: &OutDir, arrivals: &mut BTreeMap<&str, Arrival
             ready.push((files, arrival));
         }
     }
-    let looked: Vec<usize> = ready
-        .into_par_iter()
-        .map(|(files, arrival)| {
-            match find::find_pair(&files, wanted) {
-                Err(reason) if UNREAD.iter().any(|words| reason.contains(words)) => {
-                    if arrival.unchanged >= PATIENCE && !arrival.said {
-                        arrival.said = true;
-                        progress::warn(format!(
-                            "pose {} cannot be read, waiting for another file: {reason}",
-                            files.pair
-                        ));
-                    }
-                    return 0;
-                }
-                found => arrival.found = Some(found),
+    let look = |(files, arrival): (PairFiles, &mut Arrival)| match find::find_pair(&files, wanted) {
+        Err(reason) if UNREAD.iter().any(|words| reason.contains(words)) => {
+            if arrival.unchanged >= PATIENCE && !arrival.said {
+                arrival.said = true;
+                progress::warn(format!("pose {} cannot be read, waiting for another file: {reason}", files.pair));
             }
+            0
+        }
+        found => {
+            arrival.found = Some(found);
             1
-        })
-        .collect();
-    looked.iter().sum()
+        }
+    };
+    ready.into_par_iter().map(look).sum()
 }
 
 fn stamp(files: &PairFiles) -> Option<Stamp> {
@@ -129,14 +122,12 @@ fn stamp(files: &PairFiles) -> Option<Stamp> {
 
 /// Measures what is there and says which poses must be taken again.
 fn judge(poses: &[RobotPose], arrivals: &BTreeMap<&str, Arrival>, known: &Knowledge, refused: &mut BTreeSet<String>) {
-    let seen: Vec<Seen> = poses
-        .iter()
-        .filter_map(|at| {
-            let found = arrivals.get(at.pose.as_str())?.found.clone()?;
-            let corners = found.map_err(|reason| Refusal { status: "not seen", reason });
-            Some(Seen { at: at.clone(), corners })
-        })
-        .collect();
+    let of = |at: &RobotPose| {
+        let found = arrivals.get(at.pose.as_str())?.found.clone()?;
+        let corners = found.map_err(|reason| Refusal { status: "not seen", reason });
+        Some(Seen { at: at.clone(), corners })
+    };
+    let seen: Vec<Seen> = poses.iter().filter_map(of).collect();
     let count = seen.len();
     let series = series::measure(known, seen);
     for m in &series.poses {

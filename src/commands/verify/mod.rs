@@ -8,26 +8,21 @@ mod recheck;
 use camino::Utf8Path;
 use serde::Serialize;
 
-use super::beyond;
-use super::{Outcome, Result};
+use super::{Outcome, Result, beyond};
 use crate::cli::Verify;
 use crate::config::Config;
 use crate::diagnostic::{Status, count};
-use crate::files;
 use crate::files::provenance::Run;
 use crate::formats::robots::known;
-use crate::identify;
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::known as distances;
-use crate::identify::data::{still, targets, unused};
+use crate::identify::data::{known as distances, still, targets, unused};
 use crate::identify::examine::{self, Examined, on_rows};
 use crate::identify::judge::errors::{Judge, PLACED_BY_ITSELF};
 use crate::identify::judge::{folds, strays};
 use crate::identify::record::{self, PointSpread, spread};
 use crate::measurements::{Measurement, Observed, Role};
-use crate::progress;
-use crate::report;
 use crate::robot::{self, Robot};
+use crate::{files, identify, progress, report};
 
 /// What `--json` prints.
 #[derive(Debug, Serialize)]
@@ -92,17 +87,9 @@ fn fitted_to(file: &Utf8Path, rows: &[Measurement]) -> Option<String> {
     })
 }
 
-/// What the examination made of the rows and of the first robot.
-struct Mended {
-    set: Dataset,
-    /// The first robot, where its file was mended.
-    robot: Option<Robot>,
-    /// Whether rows and robots are what their files say, and something explains the errors.
-    is_sound: bool,
-}
-
-/// The set as the examination mends it, its findings said. Signs and zeros of joints are mended in the rows, so that all robots are judged by the same.
-fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::Settings) -> Mended {
+/// The set as the examination mends it, its findings said, and whether rows and robots are what their files say and something explains the errors.
+/// Signs and zeros of joints are mended in the rows, so that all robots are judged by the same, or else in the first robot.
+fn examined(set: &Dataset, file: &Utf8Path, robot: &mut Robot, settings: &identify::Settings) -> (Dataset, bool) {
     let Examined { set, robot: mended, along, findings, against, unexplained } =
         examine::examine(set, robot, settings, &|_| {});
     let is_sound = unexplained.is_none() && against.is_empty() && mended == *robot;
@@ -111,13 +98,14 @@ fn examined(set: &Dataset, file: &Utf8Path, robot: &Robot, settings: &identify::
         progress::warn(finding.sentence());
     }
     let of_rows = on_rows::mended(&set, robot, &mended);
-    if of_rows.is_none() {
+    let set = of_rows.unwrap_or_else(|| {
         progress::warn(format!(
             "the figures of {file} are those with this correction, those of other robots are without it"
         ));
-    }
-    let robot = of_rows.is_none().then_some(mended);
-    Mended { set: of_rows.unwrap_or(set), robot, is_sound }
+        *robot = mended;
+        set
+    });
+    (set, is_sound)
 }
 
 /// What the user must know of the rows.
@@ -140,7 +128,6 @@ fn tell(set: &Dataset, folded: bool, only_verify: bool) {
     }
 }
 
-/// Runs the command.
 pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return recheck::run(args, against, config, run);
@@ -172,9 +159,7 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     }
     let mut is_sound = true;
     if let Some((file, robot)) = robots.first_mut() {
-        let mended = examined(&set, file, robot, settings);
-        (set, is_sound) = (mended.set, mended.is_sound);
-        *robot = mended.robot.unwrap_or_else(|| robot.clone());
+        (set, is_sound) = examined(&set, file, robot, settings);
     }
     let folded = !only_verify && set.verify_rows().is_empty();
     let (fitted, judged) = match only_verify || folded {

@@ -22,10 +22,9 @@ use crate::identify::examine::shifted;
 use crate::identify::judge::locate::FEWEST_POSES;
 use crate::identify::judge::recheck::{Before, Recheck, Stood, recheck};
 use crate::measurements::{Measurement, Observed, Role};
-use crate::progress;
-use crate::report;
 use crate::report::robot_recheck::Judged;
 use crate::robot::{self, Advice, Robot};
+use crate::{progress, report};
 
 pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Result<Outcome> {
     let (robot, check) = robot::file::read_checked(against)?;

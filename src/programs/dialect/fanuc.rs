@@ -1,7 +1,6 @@
 //! Fanuc's listing: positions `J1= .. deg` behind `/POS`.
 
 use std::fmt::Write as _;
-
 use std::ops::Range;
 
 use crate::programs::instruction::{Cause, Instruction};
@@ -17,14 +16,11 @@ const RELATIVE: &str = "INC";
 /// Options that follow a sensor.
 const LED: [&str; 3] = ["TRACK", "TAST", "AVC"];
 
-/// What begins a comment inside of a line: nothing, as no line has an end in it.
-const NO_MARK: &str = "\n";
-
 /// Positions in joint coordinates, by their number.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     let names = scan::axes('J', count);
     let position = |at: usize| {
-        let numbers = scan::labelled(text, at, &names, &["deg", "mm", ","])?;
+        let numbers = scan::labelled(text, at, &names)?;
         let before = &text[..at];
         let open = before.rfind("P[")?;
         let name = before[open..].split_inclusive(']').next().map(str::to_owned);
@@ -133,8 +129,8 @@ fn instructions(text: &str) -> String {
         let blank = if remark { line.trim_end().len() } else { line.len() - body.len() };
         let (hidden, shown) = line.split_at(blank);
         out.extend(hidden.bytes().map(|b| if b == b'\n' { '\n' } else { ' ' }));
-        // Names in quotes may hold anything.
-        out.push_str(&scan::code(shown, NO_MARK));
+        // Names in quotes may hold anything; nothing begins a comment inside of a line, and no line has an end in it.
+        out.push_str(&scan::code(shown, "\n"));
     }
     out
 }

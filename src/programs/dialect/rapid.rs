@@ -1,7 +1,6 @@
 //! ABB's language: `jointtarget` values, `[[six robot axes],[external axes]]`, deg.
 
 use std::fmt::Write as _;
-
 use std::ops::Range;
 
 use crate::programs::handed::{self, Calls};

@@ -1,7 +1,6 @@
 //! Yaskawa's job: positions `C00000=..` in pulses or angles, by the `///POSTYPE` before them.
 
 use std::fmt::Write as _;
-
 use std::ops::Range;
 
 use crate::programs::instruction::{Cause, Instruction};

@@ -3,11 +3,11 @@
 use crate::diagnostic::two_digits;
 use crate::report::Result;
 use crate::report::drawing::figure::Plot;
-use crate::report::page::{self};
+use crate::report::page;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::lengths::Axis;
 use crate::stereo::judge::lengths::held_out::{Accuracy, HeldOutPair};
-use crate::stereo::judge::lengths::{Axis, Range};
 use crate::stereo::judge::residual_correlation::Field;
 use maud::{Markup, html};
 
@@ -16,40 +16,26 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     let accuracy = &judged.facts.accuracy;
     let [long, _] = accuracy.long_mm;
     let [short, _] = accuracy.short_mm;
-    let every = every_length(accuracy);
     let guard = |plot: Plot| plot.hline(judged.facts.tolerance_mm, "tolerance").hline(-judged.facts.tolerance_mm, "");
-    let a = guard(
-        Plot::new(&format!("(a) Errors of all lengths of {long} mm"), "pair used, in the order of names", "error, mm")
-            .whole_x()
-            .points("", &every),
-    )
-    .svg()?;
-    let mean = |of: fn(&HeldOutPair) -> Option<f64>| -> Vec<(f64, f64)> {
-        accuracy.pairs.iter().enumerate().filter_map(|(i, p)| Some((i as f64 + 1.0, of(p)?))).collect()
+    let title = format!("(a) Errors of all lengths of {long} mm");
+    let a = Plot::new(&title, "pair used, in the order of names", "error, mm").whole_x();
+    let a = guard(a.points("", every_length(accuracy))).svg()?;
+    let mean = |of: fn(&HeldOutPair) -> Option<f64>| {
+        accuracy.pairs.iter().enumerate().filter_map(move |(i, p)| Some((i as f64 + 1.0, of(p)?)))
     };
     let b = Plot::new("(b) Mean error of every pair", "pair used, in the order of names", "mean error, mm")
         .whole_x()
-        .points(&format!("x {short} mm"), &mean(|p| p.mean_error_x_short_mm))
-        .points(&format!("y {short} mm"), &mean(|p| p.mean_error_y_short_mm))
-        .points(&format!("x {long} mm"), &mean(|p| p.mean_error_x_long_mm))
-        .points(&format!("y {long} mm"), &mean(|p| p.mean_error_y_long_mm))
+        .points(&format!("x {short} mm"), mean(|p| p.mean_error_x_short_mm))
+        .points(&format!("y {short} mm"), mean(|p| p.mean_error_y_short_mm))
+        .points(&format!("x {long} mm"), mean(|p| p.mean_error_x_long_mm))
+        .points(&format!("y {long} mm"), mean(|p| p.mean_error_y_long_mm))
         .svg()?;
     let range_plot = |title: &str, along: Axis| {
-        let of = |y: fn(&Range) -> f64| -> Vec<(f64, f64)> {
-            accuracy.ranges.iter().filter(|r| r.axis == along).map(|r| (r.nominal_mm, y(r))).collect()
-        };
-        let bars: Vec<(f64, f64, f64)> = accuracy
-            .ranges
-            .iter()
-            .filter(|r| r.axis == along)
-            .map(|r| (r.nominal_mm, r.mean_error_mm, r.std_mm))
-            .collect();
-        guard(
-            Plot::new(title, "range, mm", "error, mm")
-                .error_bars("mean and std", &bars)
-                .line("max |error|", &of(|r| r.max_abs_error_mm)),
-        )
-        .svg()
+        let ranges = || accuracy.ranges.iter().filter(|r| r.axis == along);
+        let plot = Plot::new(title, "range, mm", "error, mm")
+            .error_bars("mean and std", ranges().map(|r| (r.nominal_mm, r.mean_error_mm, r.std_mm)))
+            .line("max |error|", ranges().map(|r| (r.nominal_mm, r.max_abs_error_mm)));
+        guard(plot).svg()
     };
     let c = range_plot("(c) Every range along x", Axis::X)?;
     let d = range_plot("(d) Every range along y", Axis::Y)?;
@@ -84,10 +70,9 @@ pub(super) fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
 
 pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Markup> {
     let rig = calibration.rig();
-    let mut figures = Vec::new();
-    for (field, camera) in judged.facts.residual_pattern.fields.iter().zip([&rig.left, &rig.right]) {
-        figures.push(field_figure(field, camera.width, camera.height)?);
-    }
+    let fields = judged.facts.residual_pattern.fields.iter().zip([&rig.left, &rig.right]);
+    let figures = fields.map(|(field, camera)| field_figure(field, camera.width, camera.height));
+    let figures: Vec<Markup> = figures.collect::<Result<_>>()?;
     let noise = &calibration.noise;
     let chi = match noise.reduced_chi_square {
         Some(chi) => format!(
@@ -107,51 +92,46 @@ pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Ma
                 judged.facts.residual_pattern.neighbours.along,
                 judged.facts.residual_pattern.neighbours.standard_error))
         }
-        div.side { @for (svg, caption) in &figures { (page::figure(svg, caption)) } }
+        div.side { @for figure in &figures { (figure) } }
     })
 }
 
 /// Mean residuals over one picture, magnified, and which cells have seen corners.
-fn field_figure(field: &Field, width: u32, height: u32) -> Result<(String, String)> {
+fn field_figure(field: &Field, width: u32, height: u32) -> Result<Markup> {
     let longest = field.cells.iter().map(|c| c.mean_px[0].hypot(c.mean_px[1])).fold(0.0, f64::max);
     let cell = f64::from(width) / (field.cells.len() as f64).sqrt();
     let magnify = if longest > 0.0 { 0.8 * cell / longest } else { 1.0 };
-    let arrows: Vec<[f64; 4]> = field
-        .cells
-        .iter()
-        .filter(|c| c.corners > 0)
-        .map(|c| [c.x_px, c.y_px, magnify * c.mean_px[0], magnify * c.mean_px[1]])
-        .collect();
-    let empty: Vec<(f64, f64)> = field.cells.iter().filter(|c| c.corners == 0).map(|c| (c.x_px, c.y_px)).collect();
+    let seen = || field.cells.iter().filter(|c| c.corners > 0);
+    let arrows = seen().map(|c| [c.x_px, c.y_px, magnify * c.mean_px[0], magnify * c.mean_px[1]]);
+    let empty = field.cells.iter().filter(|c| c.corners == 0).map(|c| (c.x_px, c.y_px));
     let svg = Plot::new(&format!("Mean residuals, {} picture", field.side), "x, px", "y, px")
-        .vectors("", &arrows)
-        .points("no corner", &empty)
-        .x_range(-0.5, f64::from(width) - 0.5)
-        .y_range(-0.5, f64::from(height) - 0.5)
+        .vectors("", arrows)
+        .points("no corner", empty)
+        .ranges((-0.5, f64::from(width) - 0.5), (-0.5, f64::from(height) - 0.5))
         .y_down()
         .equal_axes()
         .svg()?;
-    let seen = field.cells.iter().filter(|c| c.corners > 0).count();
     let caption = format!(
         "Arrows are magnified {magnify:.0} times; the longest is {longest:.4} px, the systematic part {:.4} px. Arrows that turn or point outward together \
-         are a lens that the model lacks. Corners reached {seen} of {} cells; what lies in the others is extrapolated.",
+         are a lens that the model lacks. Corners reached {} of {} cells; what lies in the others is extrapolated.",
         field.systematic_px,
+        seen().count(),
         field.cells.len()
     );
-    Ok((svg, caption))
+    Ok(page::figure(&svg, &caption))
 }
 
 pub(super) fn volume(judged: &Judged) -> Result<Markup> {
     let lying = |axis: usize| judged.facts.volume.lengths.iter().filter(move |l| l.direction[axis].abs() > 0.7);
-    let along = |axis: usize| -> Vec<(f64, f64)> { lying(axis).map(|l| (l.at_mm.z, l.sigma_mm())).collect() };
+    let along = |axis: usize| lying(axis).map(|l| (l.at_mm.z, l.sigma_mm()));
     let svg = Plot::new(
         &format!("Standard deviation of a length of {} mm", judged.facts.volume.length_mm),
         "distance from the left camera, mm",
         "mm",
     )
-    .points("along x", &along(0))
-    .points("along y", &along(1))
-    .points("along z", &along(2))
+    .points("along x", along(0))
+    .points("along y", along(1))
+    .points("along z", along(2))
     .svg()?;
     let worst = |axis: usize| lying(axis).map(|l| l.sigma_mm()).fold(0.0, f64::max);
     let caption = format!(

@@ -3,17 +3,16 @@
 mod figures;
 mod summary;
 
-use crate::diagnostic::{Warning, aligned, at_most, two_digits};
+use crate::diagnostic::{Warning, aligned, at_most, capital, two_digits};
 use crate::imaging::Corners;
-use crate::report::Result;
-use crate::report::blur;
 use crate::report::drawing::pair_picture::{self, PairPicture};
 use crate::report::drawing::scene::{Ink, Scene};
 use crate::report::page::{self, Tone};
-use crate::report::rig;
 use crate::report::table::{number, with_sigma};
+use crate::report::{Result, blur, rig};
 use crate::stereo::Side;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::residuals::rms_px;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::held_out::HeldOutPair;
@@ -32,11 +31,6 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
     let worst = |i: usize| pairs[i].max_abs_error_mm.unwrap_or(-1.0);
     order.sort_by(|&a, &b| worst(b).total_cmp(&worst(a)));
     order
-}
-
-/// What was found over the pairs.
-fn happened(judged: &Judged) -> Vec<String> {
-    judged.facts.findings.iter().map(|finding| finding.action.clone()).collect()
 }
 
 /// Warnings with their reasons, but for those that stand in the table of checks.
@@ -65,9 +59,10 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     };
     let next: Vec<String> = summary::next(judged).into_iter().map(on_this_page).collect();
     let warnings = warnings(judged);
+    let happened: Vec<&String> = judged.facts.findings.iter().map(|finding| &finding.action).collect();
     let content = html! {
-        (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
-        @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
+        (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), capital(&deciding_by(judged, Evidence::short_figure)))))
+        @if !happened.is_empty() { p { "What happened during the series:" } (page::warnings(&happened)) }
         (ledger(judged))
         @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
         @if !warnings.is_empty() { p { "What else to know:" } }
@@ -105,7 +100,7 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
 
 /// The three numbers of the verdict.
 fn numbers(judged: &Judged) -> [(String, String); 3] {
-    let extremes = &judged.facts.accuracy.extremes;
+    let (extremes, tolerance_mm) = (&judged.facts.accuracy.extremes, judged.facts.tolerance_mm);
     let mm = |value: f64| format!("{} mm", two_digits(value));
     [
         (
@@ -119,18 +114,13 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
                 "can be trusted: what they may be off by is more than a tenth of them".to_owned(),
             ),
             Some(trusted_mm) => (
-                format!("{} mm", at_most(trusted_mm, judged.facts.tolerance_mm)),
-                format!(
-                    "{} can be trusted to this; the tolerance is {} mm",
-                    summary::lengths(judged),
-                    judged.facts.tolerance_mm
-                ),
+                format!("{} mm", at_most(trusted_mm, tolerance_mm)),
+                format!("{} can be trusted to this; the tolerance is {tolerance_mm} mm", summary::lengths(judged)),
             ),
             None => (
                 "not known".to_owned(),
                 format!(
-                    "what lengths can be trusted to, as long as a check is open; the tolerance is {} mm",
-                    judged.facts.tolerance_mm
+                    "what lengths can be trusted to, as long as a check is open; the tolerance is {tolerance_mm} mm"
                 ),
             ),
         },
@@ -183,7 +173,7 @@ fn lines(evidence: &[&Evidence], detail: &dyn Fn(&Evidence) -> String) -> Markup
 /// What the figures do not show: the scale.
 fn scale(judged: &Judged) -> Markup {
     html! {
-        @for known in &judged.facts.standards.moves.measured { p { (page::capital(&known.statement())) "." } }
+        @for known in &judged.facts.standards.moves.measured { p { (capital(&known.statement())) "." } }
         @match &judged.facts.standards.second {
             Some(second) => p {
                 @match (second.scale_error, second.scale_error_sigma, second.max_abs_error_mm) {
@@ -213,35 +203,16 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
         column(|pair| pair.mean_error_y_long_mm),
         column(|pair| pair.gap_rms_mm),
     ];
-    let rows: Vec<Vec<String>> = order
-        .iter()
-        .enumerate()
-        .map(|(row, &i)| {
-            let pair = &judged.facts.accuracy.pairs[i];
-            let view = &calibration.views[i];
-            let rms = |side| {
-                crate::stereo::data::residuals::rms_px(
-                    &calibration.values.shared,
-                    &calibration.values.poses[i],
-                    view,
-                    side,
-                )
-            };
-            let [most, x, y, gap] = errors.each_ref().map(|column| column[row].clone());
-            vec![
-                pair.pair.clone(),
-                most,
-                x,
-                y,
-                gap,
-                number(rms(Side::Left), 3),
-                number(rms(Side::Right), 3),
-                view.active(Side::Left).count().to_string(),
-                view.active(Side::Right).count().to_string(),
-                view.observations.iter().filter(|o| !o.active).count().to_string(),
-            ]
-        })
-        .collect();
+    let values = &calibration.values;
+    let row = |(row, &i): (usize, &usize)| {
+        let view = &calibration.views[i];
+        let rms = Side::BOTH.map(|side| number(rms_px(&values.shared, &values.poses[i], view, side), 3));
+        let corners = Side::BOTH.map(|side| view.active(side).count().to_string());
+        let outliers = view.observations.iter().filter(|o| !o.active).count();
+        let errors = errors.each_ref().map(|column| column[row].clone());
+        let name = judged.facts.accuracy.pairs[i].pair.clone();
+        std::iter::once(name).chain(errors).chain(rms).chain(corners).chain([outliers.to_string()])
+    };
     let header = [
         "pair",
         "max |error| mm",
@@ -254,11 +225,10 @@ fn pairs(calibration: &Calibration, judged: &Judged) -> Markup {
         "right",
         "outliers",
     ];
-    let skipped: Vec<Vec<String>> =
-        calibration.skipped.iter().map(|s| vec![s.pair.clone(), s.reason.clone()]).collect();
+    let skipped = calibration.skipped.iter().map(|s| [s.pair.clone(), s.reason.clone()]);
     html! {
-        div.scroll { (page::table(&header, &rows)) }
-        @if !skipped.is_empty() { h2 { "Pairs that were not used" } (page::table(&["pair", "why"], &skipped)) }
+        div.scroll { (page::table(&header, order.iter().enumerate().map(row))) }
+        @if !calibration.skipped.is_empty() { h2 { "Pairs that were not used" } (page::table(&["pair", "why"], skipped)) }
     }
 }
 
@@ -287,12 +257,11 @@ fn parameters(calibration: &Calibration) -> Markup {
     let layout = &calibration.layout;
     let values = layout.numbers(&calibration.values.shared);
     let covariance = &calibration.covariance;
-    let mut rows: Vec<Vec<String>> = layout
-        .names()
-        .into_iter()
-        .enumerate()
-        .map(|(i, name)| std::iter::once(name).chain(with_sigma(values[i], covariance[(i, i)].sqrt())).collect())
-        .collect();
+    let row = |(i, name): (usize, String)| {
+        let [value, sigma] = with_sigma(values[i], covariance[(i, i)].sqrt());
+        [name, value, sigma]
+    };
+    let mut rows: Vec<[String; 3]> = layout.names().into_iter().enumerate().map(row).collect();
     // How the cameras stand to each other first: lenses are known from elsewhere, too.
     rows.sort_by_key(|row| !row[0].starts_with("right_from_left"));
     let rig = calibration.rig();
@@ -302,51 +271,37 @@ fn parameters(calibration: &Calibration) -> Markup {
             (number(Some(rig.right_from_left.rotation.angle().to_degrees()), 3)) " degrees against the left one. A point in the left camera's frame is brought into the right \
              one's by " code { "right_from_left" } "."
         }
-        (page::table(&["number", "value", "standard deviation"], &rows))
+        (page::table(&["number", "value", "standard deviation"], rows))
     }
 }
 
 fn lenses(calibration: &Calibration) -> Markup {
-    let rows: Vec<Vec<String>> = calibration
-        .lens_scores
-        .iter()
-        .map(|s| {
-            let px = s.held_out_rms_px.map_or("-".to_owned(), |px| format!("{px:.5}"));
-            vec![s.model.to_owned(), px]
-        })
-        .collect();
+    let rows = calibration.lens_scores.iter().map(|s| {
+        let px = s.held_out_rms_px.map_or("-".to_owned(), |px| format!("{px:.5}"));
+        [s.model.to_owned(), px]
+    });
     html! {
-        @if !rows.is_empty() {
+        @if !calibration.lens_scores.is_empty() {
             p { "Lens models on held-out pairs. The simplest within two standard errors of the best was taken; those without a figure give no significant gain, or these pairs do not determine them." }
-            (page::table(&["lens", "held-out residual px"], &rows))
+            (page::table(&["lens", "held-out residual px"], rows))
         }
     }
 }
 
 fn disagreements(judged: &Judged) -> Markup {
-    let rows: Vec<Vec<String>> = judged
-        .facts
-        .disagreements
-        .iter()
-        .map(|d| {
-            let [x, y, z] = d.translation_change_mm;
-            vec![
-                d.name(),
-                two_digits(d.length_change_mm),
-                format!("{:.0}", d.chi_square_fall),
-                format!("{:.0}", d.chance),
-                format!("{x:.3}, {y:.3}, {z:.3}"),
-            ]
-        })
-        .collect();
+    let rows = judged.facts.disagreements.iter().map(|d| {
+        let [x, y, z] = d.translation_change_mm;
+        let [fall, chance] = [d.chi_square_fall, d.chance].map(|value| format!("{value:.0}"));
+        [d.name(), two_digits(d.length_change_mm), fall, chance, format!("{x:.3}, {y:.3}, {z:.3}")]
+    });
     let header = ["model", "lengths change by mm", "chi-squared falls by", "chance", "baseline vector mm"];
     html! {
-        @if !rows.is_empty() {
+        @if !judged.facts.disagreements.is_empty() {
             p {
                 "Other models that fit the corners, and that give other lengths. The standard deviations above hold only if lens and board are what they were taken \
                  for; the truth may lie anywhere between these models, and lengths with it."
             }
-            (page::table(&header, &rows))
+            (page::table(&header, rows))
         }
     }
 }

@@ -1,9 +1,8 @@
 //! The verdict in words, and the table on stdout.
 
-use crate::diagnostic::{at_most, count, two_digits};
+use crate::diagnostic::{at_most, capital, count, two_digits};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
-use crate::report::page;
 use crate::report::table::{Table, number};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
@@ -30,16 +29,12 @@ pub(super) fn word(verdict: Verdict) -> &'static str {
     }
 }
 
-pub(super) fn axis(range: &Range) -> &'static str {
-    if range.axis == Axis::X { "x" } else { "y" }
-}
-
 /// The first screen: the verdict and what it is for, the pairs, the rig, what to do next.
 pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> String {
     let mut lines = vec![
         format!("{}: {}", word(judged.verdict), explanation(judged)),
         volume(judged),
-        deciding(judged),
+        deciding_by(judged, Evidence::figure),
         trusted(judged),
     ];
     lines.extend(standing(calibration));
@@ -58,14 +53,14 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
 /// The shortest, a middle and the longest range along each axis.
 fn ranges(judged: &Judged) -> Table {
     let mut table = Table::new(["range mm", "lengths", "mean mm", "std mm", "max |error| mm"]);
-    for along in [Axis::X, Axis::Y] {
+    for (name, along) in [("x", Axis::X), ("y", Axis::Y)] {
         let ranges: Vec<&Range> = judged.facts.accuracy.ranges.iter().filter(|r| r.axis == along).collect();
         let mut shown: Vec<usize> =
             (0..TABLE_ROWS).map(|k| k * ranges.len().saturating_sub(1) / (TABLE_ROWS - 1)).collect();
         shown.dedup();
         for range in shown.into_iter().filter_map(|i| ranges.get(i)) {
             table.row([
-                format!("{} {}", axis(range), range.nominal_mm),
+                format!("{name} {}", range.nominal_mm),
                 range.count.to_string(),
                 number(Some(range.mean_error_mm), 4),
                 number(Some(range.std_mm), 4),
@@ -237,12 +232,7 @@ pub(super) fn explanation(judged: &Judged) -> String {
     )
 }
 
-/// The line of the ledger that decides, and which others are below a pass.
-fn deciding(judged: &Judged) -> String {
-    deciding_by(judged, Evidence::figure)
-}
-
-/// The same, the figure as a page or the terminal has it.
+/// The line of the ledger that decides, and which others are below a pass; the figure as a page or the terminal has it.
 pub(super) fn deciding_by(judged: &Judged, figure: fn(&Evidence) -> String) -> String {
     let deciding = judged.deciding();
     let below = || judged.evidence.iter().filter(|line| line.allows != Verdict::Pass);
@@ -311,7 +301,7 @@ pub(super) fn advice(judged: &Judged) -> String {
                 Extent::Boards => "the volume where the boards stood".to_owned(),
                 asked => asked.said(),
             };
-            format!("{} can be trusted to {} mm in {over}.", page::capital(&lengths(judged)), at_most(trusted, sure))
+            format!("{} can be trusted to {} mm in {over}.", capital(&lengths(judged)), at_most(trusted, sure))
         }
         Verdict::Undecided => format!(
             "Not decided: the checks below that are not passed say why and what to do; until then do not rely on {sure} mm."

@@ -8,8 +8,7 @@ use super::axis::{Ticked, padded, power_of_ten, tick, widened};
 use super::label::{Area, LABEL_PX};
 use super::marks::Marks;
 use crate::diagnostic::aligned;
-use crate::report::Error;
-use crate::report::Result;
+use crate::report::{Error, Result};
 
 /// Drawn at twice the size it is shown, because the backend rounds to whole units.
 const SCALE: u32 = 2;
@@ -65,8 +64,8 @@ impl Plot {
     }
 
     /// Adds points. An empty label keeps a series out of the legend.
-    pub fn points(self, label: &str, xy: &[(f64, f64)]) -> Plot {
-        self.with(label, Marks::Points(xy.to_vec()))
+    pub fn points(self, label: &str, xy: impl IntoIterator<Item = (f64, f64)>) -> Plot {
+        self.with(label, Marks::Points(xy.into_iter().collect()))
     }
 
     /// Adds points by thirds of a length that each carries, none of them below `least_mm`: `(x, y, mm)`.
@@ -81,24 +80,24 @@ impl Plot {
                 [low, ..] => format!("{low} mm and more"),
                 [] => String::new(),
             };
-            self = self.points(&label, &within.map(|&(x, y, _)| (x, y)).collect::<Vec<_>>());
+            self = self.points(&label, within.map(|&(x, y, _)| (x, y)));
         }
         self
     }
 
     /// Adds a line through points.
-    pub fn line(self, label: &str, xy: &[(f64, f64)]) -> Plot {
-        self.with(label, Marks::Line(xy.to_vec()))
+    pub fn line(self, label: &str, xy: impl IntoIterator<Item = (f64, f64)>) -> Plot {
+        self.with(label, Marks::Line(xy.into_iter().collect()))
     }
 
     /// Adds points with upright bars of the given half length: `(x, y, half)`.
-    pub fn error_bars(self, label: &str, bars: &[(f64, f64, f64)]) -> Plot {
-        self.with(label, Marks::ErrorBars(bars.to_vec()))
+    pub fn error_bars(self, label: &str, bars: impl IntoIterator<Item = (f64, f64, f64)>) -> Plot {
+        self.with(label, Marks::ErrorBars(bars.into_iter().collect()))
     }
 
     /// Adds arrows `[x, y, dx, dy]`, lengths in the axes' units: the caller magnifies and says so in the caption.
-    pub fn vectors(self, label: &str, arrows: &[[f64; 4]]) -> Plot {
-        self.with(label, Marks::Vectors(arrows.to_vec()))
+    pub fn vectors(self, label: &str, arrows: impl IntoIterator<Item = [f64; 4]>) -> Plot {
+        self.with(label, Marks::Vectors(arrows.into_iter().collect()))
     }
 
     /// Adds a level line across the figure, for a tolerance.
@@ -107,15 +106,9 @@ impl Plot {
         self
     }
 
-    /// Fixes the range of x.
-    pub fn x_range(mut self, low: f64, high: f64) -> Plot {
-        self.x_range = Some((low, high));
-        self
-    }
-
-    /// Fixes the range of y.
-    pub fn y_range(mut self, low: f64, high: f64) -> Plot {
-        self.y_range = Some((low, high));
+    /// Fixes the ranges of x and y.
+    pub fn ranges(mut self, x: (f64, f64), y: (f64, f64)) -> Plot {
+        (self.x_range, self.y_range) = (Some(x), Some(y));
         self
     }
 
@@ -175,7 +168,7 @@ impl Plot {
         (x.is_finite() && y.is_finite()).then_some((x, y))
     }
 
-    fn ranges(&self) -> ((f64, f64), (f64, f64)) {
+    fn shown(&self) -> ((f64, f64), (f64, f64)) {
         let places: Vec<(f64, f64)> =
             self.series.iter().flat_map(|(_, m)| m.extent()).filter_map(|p| self.plotted(p)).collect();
         let guides = self.guides.iter().filter_map(|g| self.plotted((0.0, g.0))).map(|p| p.1);
@@ -202,7 +195,7 @@ impl Plot {
     fn draw(&self, root: &DrawingArea<SVGBackend<'_>, Shift>) -> std::result::Result<(), String> {
         let say = |e: DrawingAreaErrorKind<_>| e.to_string();
         root.fill(&WHITE).map_err(say)?;
-        let (x, mut y) = self.ranges();
+        let (x, mut y) = self.shown();
         if self.y_down {
             y = (y.1, y.0);
         }
@@ -336,10 +329,10 @@ mod tests {
     #[test]
     fn every_kind_of_mark_is_drawn() {
         let svg = Plot::new("a & b", "x, mm", "y, <px>")
-            .points("p", &[(0.0, 1.0), (1.0, f64::NAN)])
-            .line("l", &[(0.0, 0.0), (1.0, 1.0)])
-            .error_bars("e", &[(0.5, 0.5, 0.1)])
-            .vectors("v", &[[0.0, 0.0, 0.1, 0.1]])
+            .points("p", [(0.0, 1.0), (1.0, f64::NAN)])
+            .line("l", [(0.0, 0.0), (1.0, 1.0)])
+            .error_bars("e", [(0.5, 0.5, 0.1)])
+            .vectors("v", [[0.0, 0.0, 0.1, 0.1]])
             .hline(0.9, "limit")
             .svg()
             .unwrap();
@@ -351,16 +344,17 @@ mod tests {
 
     #[test]
     fn what_is_not_drawn_has_no_place_in_the_legend() {
-        let plot = Plot::new("t", "x", "y").points("seen", &[(0.0, 1.0)]).points("absent", &[]);
-        let svg = plot.log_y().points("zero", &[(0.0, 0.0)]).svg().unwrap();
+        let plot = Plot::new("t", "x", "y").points("seen", [(0.0, 1.0)]).points("absent", []);
+        let svg = plot.log_y().points("zero", [(0.0, 0.0)]).svg().unwrap();
         assert!(svg.contains("seen") && !svg.contains("absent") && !svg.contains("zero"), "{svg}");
     }
 
     #[test]
     fn counts_have_whole_ticks() {
         for pairs in [1, 2, 4, 6, 13, 60] {
-            let dots: Vec<(f64, f64)> = (1..=pairs).map(|k| (f64::from(k), 0.1)).collect();
-            let svg = Plot::new("t", "pair", "y").whole_x().points("", &dots).y_range(0.0, 1.0).svg().unwrap();
+            let dots = (1..=pairs).map(|k| (f64::from(k), 0.1));
+            let plot = Plot { y_range: Some((0.0, 1.0)), ..Plot::new("t", "pair", "y") };
+            let svg = plot.whole_x().points("", dots).svg().unwrap();
             let labels: Vec<&str> =
                 svg.split('>').filter_map(|part| part.strip_suffix("</text")).map(str::trim).collect();
             let whole: Vec<i64> = labels.iter().filter_map(|label| label.parse().ok()).collect();
@@ -372,7 +366,7 @@ mod tests {
 
     #[test]
     fn nothing_to_draw_is_an_empty_frame() {
-        for plot in [Plot::new("t", "x", "y"), Plot::new("t", "x", "y").log_y().line("l", &[(0.0, 0.0), (1.0, -1.0)])] {
+        for plot in [Plot::new("t", "x", "y"), Plot::new("t", "x", "y").log_y().line("l", [(0.0, 0.0), (1.0, -1.0)])] {
             assert!(plot.equal_axes().svg().unwrap().starts_with("<svg"));
         }
     }

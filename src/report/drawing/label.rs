@@ -53,10 +53,8 @@ impl Area {
             };
             drawn.iter().filter(in_label).count()
         };
-        let best = places.min_by_key(hidden);
-        best.map_or((first, Pos::new(HPos::Left, VPos::Bottom)), |(start, along, _)| {
-            (start, Pos::new(HPos::Left, along))
-        })
+        let (start, along, _) = places.min_by_key(hidden).unwrap_or((first, VPos::Bottom, self.up));
+        (start, Pos::new(HPos::Left, along))
     }
 }
 

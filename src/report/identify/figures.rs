@@ -5,19 +5,18 @@ use nalgebra::Point3;
 
 use crate::identify::judge::errors::RowError;
 use crate::identify::judge::uncertainty::Expected;
-use crate::identify::record::{MethodRecord, Record};
+use crate::identify::record::Record;
 use crate::identify::solve::swarm::halton;
 use crate::measurements::Role;
-use crate::report::Result;
 use crate::report::drawing::figure::Plot;
 use crate::report::drawing::scene::{Ink, Scene};
-use crate::report::page;
+use crate::report::{Result, page};
 
 /// The errors of rows that took no part in the fit; `folded` where each was left out of a fit of its own.
 pub(super) fn verification_figure(before: &[RowError], after: &[RowError], folded: bool) -> Result<Markup> {
+    let numbered = |(i, e): (usize, &RowError)| Some(((i + 1) as f64, e.distance_mm?.abs()));
     let series = |errors: &[RowError]| -> Vec<(f64, f64)> {
-        let numbered = errors.iter().enumerate().filter_map(|(i, e)| Some(((i + 1) as f64, e.distance_mm?.abs())));
-        numbered.filter(|(_, error)| *error > 0.0).collect()
+        errors.iter().enumerate().filter_map(numbered).filter(|(_, error)| *error > 0.0).collect()
     };
     let (title, rows) = match folded {
         true => ("Distance errors of rows held out of the fit", "row, in the order of the file"),
@@ -25,8 +24,8 @@ pub(super) fn verification_figure(before: &[RowError], after: &[RowError], folde
     };
     let svg = Plot::new(title, rows, "absolute error, mm")
         .whole_x()
-        .points("before", &series(before))
-        .points("after", &series(after))
+        .points("before", series(before))
+        .points("after", series(after))
         .log_y()
         .svg()?;
     Ok(page::figure(
@@ -52,12 +51,10 @@ pub(super) fn expected_map(expected: &Expected, places: &[(Role, Point3<f64>)]) 
 
 pub(super) fn convergence_figure(record: &Record) -> Result<Markup> {
     let model = record.chosen_method().map_or("", |m| m.model);
-    let series = |m: &MethodRecord| -> Vec<(f64, f64)> {
-        m.history.iter().enumerate().filter(|(_, c)| **c > 0.0).map(|(i, &c)| (i as f64, c)).collect()
-    };
     let mut plot = Plot::new("Best cost by iteration", "iteration", "cost, mm²").log_y();
     for method in record.methods.iter().filter(|m| m.model == model) {
-        plot = plot.line(method.name, &series(method));
+        let history = method.history.iter().enumerate().filter(|(_, c)| **c > 0.0);
+        plot = plot.line(method.name, history.map(|(i, &c)| (i as f64, c)));
     }
     Ok(page::figure(&plot.svg()?, "Lines that end above the lowest one have stopped short of the minimum."))
 }
@@ -82,13 +79,11 @@ pub(super) fn in_space(places: &[(Role, Point3<f64>)], arm: &[Point3<f64>]) -> M
 /// Fig. 7 of the paper: the poses from above and from the side.
 pub(super) fn layout_figures(places: &[(Role, Point3<f64>)]) -> Result<Markup> {
     let view = |title: &str, vertical: &str, axes: (usize, usize)| {
-        let series = |role: Role| -> Vec<(f64, f64)> {
-            places.iter().filter(|(r, _)| *r == role).map(|(_, p)| (p[axes.0], p[axes.1])).collect()
-        };
+        let series = |role: Role| places.iter().filter(move |(r, _)| *r == role).map(|(_, p)| (p[axes.0], p[axes.1]));
         Plot::new(title, "x, mm", vertical)
-            .points("sample", &series(Role::Sample))
-            .points("verify", &series(Role::Verify))
-            .points("centre", &series(Role::Center))
+            .points("sample", series(Role::Sample))
+            .points("verify", series(Role::Verify))
+            .points("centre", series(Role::Center))
             .equal_axes()
             .svg()
     };
@@ -105,9 +100,9 @@ const START_POINTS: usize = 200;
 
 /// Fig. 3 of the paper: Halton's sequence beside pseudo-random numbers.
 pub(super) fn start_figures(seed: u64) -> Result<Markup> {
-    let pairs = |numbers: &[f64]| -> Vec<(f64, f64)> { numbers.chunks_exact(2).map(|p| (p[0], p[1])).collect() };
     let plot = |title: &str, numbers: &[f64]| {
-        Plot::new(title, "first coordinate", "second coordinate").points("", &pairs(numbers)).equal_axes().svg()
+        let pairs = numbers.chunks_exact(2).map(|p| (p[0], p[1]));
+        Plot::new(title, "first coordinate", "second coordinate").points("", pairs).equal_axes().svg()
     };
     let halton = plot("Halton sequence", &halton::points(START_POINTS, 2, seed))?;
     let random = plot("Pseudo-random numbers", &crate::identify::solve::swarm::uniform(2 * START_POINTS, seed))?;

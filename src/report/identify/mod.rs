@@ -11,7 +11,7 @@ use nalgebra::Point3;
 use super::Result;
 use super::page::{self, Tone};
 use super::table::short;
-use crate::diagnostic::two_digits;
+use crate::diagnostic::{capital, two_digits};
 use crate::formats::placements::record::PlacementFile;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::judge::errors::RowError;
@@ -120,12 +120,12 @@ fn verdict(record: &Record) -> Markup {
     }
     let after = after.map_or(String::new(), |after| format!(" After: {}.", screen::errors(after, two_digits)));
     let reason = record.whole_reason();
-    let reason = if reason.is_empty() { String::new() } else { format!("{}. ", page::capital(reason)) };
+    let reason = if reason.is_empty() { String::new() } else { format!("{}. ", capital(reason)) };
     let detail = format!(
         "{reason}Before: {}.{after} {}.{}",
         screen::errors(before, two_digits),
-        page::capital(&screen::judged_on(record)),
-        screen::of_tool(record).map_or_else(String::new, |said| format!(" {}.", page::capital(&said)))
+        capital(&screen::judged_on(record)),
+        screen::of_tool(record).map_or_else(String::new, |said| format!(" {}.", capital(&said)))
     );
     page::verdict(tone, word, &numbers, &detail)
 }

@@ -193,17 +193,16 @@ pub fn verified(robots: &[(&str, &PointSpread)], folded: bool) -> String {
         table.row(std::iter::once((*name).to_owned()).chain(figures.map(|figure| number(figure, 4))));
     }
     let any = |of: fn(&PointSpread) -> bool| robots.iter().any(|(_, spread)| of(spread));
-    let distances =
-        "mean to min: errors of distances from the centre of each group, or from the row nearest to its middle";
-    let columns = match (any(|s| s.point.is_some()), any(|s| s.distortion.is_some()), any(|s| s.consistency.is_some()))
-    {
-        (true, ..) => format!("{distances}; point: of points, after one rigid fit to each placement"),
-        (_, true, _) => {
-            "mean to min: distances of touches from the middle of their point; point: errors of known distances"
-                .to_owned()
+    let columns = match () {
+        () if any(|s| s.point.is_some()) => {
+            "errors of distances from the centre of each group, or from the row nearest to its middle; point: of points, after one rigid \
+             fit to each placement"
         }
-        (.., true) => "mean to min: distances of touches from the middle of their point".to_owned(),
-        _ => "mean to min: errors of distances".to_owned(),
+        () if any(|s| s.distortion.is_some()) => {
+            "distances of touches from the middle of their point; point: errors of known distances"
+        }
+        () if any(|s| s.consistency.is_some()) => "distances of touches from the middle of their point",
+        () => "errors of distances",
     };
-    format!("{table}{columns}\n")
+    format!("{table}mean to min: {columns}\n")
 }

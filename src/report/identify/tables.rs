@@ -58,16 +58,15 @@ pub(super) fn worst_table(set: &Dataset, before: &[RowError], after: &[RowError]
     let row = |(k, (_, _, after)): (usize, &Worst)| {
         let pose = &set.poses[after.row];
         let names = [pose.name.clone(), set.groups[pose.group].name.clone()];
-        names.into_iter().chain(figures.iter().map(|column| column[k].clone())).collect()
+        names.into_iter().chain(figures.iter().map(move |column| column[k].clone()))
     };
-    let rows: Vec<Vec<String>> = errors.iter().enumerate().map(row).collect();
     let named = if folded { "row" } else { "verify row" };
     let header = [named, "group", "distance before, mm", "after, mm", "point before, mm", "after, mm"];
     html! {
         p { "The worst after identification, predicted minus measured. "
             @if set.groups.len() > 1 { "Where all are of one group, the " (sensor(set.is_of_cameras())) " or its centre moved there. " }
             "Where all are of one region of the workspace, the model lacks something there." }
-        (page::table(&header, &rows))
+        (page::table(&header, errors.iter().enumerate().map(row)))
     }
 }
 
@@ -83,19 +82,17 @@ pub(super) fn verification_table(record: &Record) -> Markup {
         if name == record.chosen { format!("{name} (kept)") } else { name }
     };
     let methods = record.methods.iter().map(|m| (named(m), m.quality.judged()));
-    let robots: Vec<(String, &PointSpread)> = std::iter::once(("before".to_owned(), before)).chain(methods).collect();
-    let row = |(name, s): &(String, &PointSpread)| {
+    let robots = std::iter::once(("before".to_owned(), before)).chain(methods);
+    let row = |(name, s): (String, &PointSpread)| {
         let better = gain(&before.distance, &s.distance).filter(|_| name != "before").unwrap_or_default();
         let Spread { mean_abs_mm, std_mm, max_abs_mm, min_abs_mm, .. } = s.distance;
         let points = [s.point.and_then(|p| p.mean_abs_mm), s.point.and_then(|p| p.max_abs_mm)];
         let distances = [mean_abs_mm, std_mm, max_abs_mm, min_abs_mm].map(short);
-        let cells = std::iter::once(name.clone()).chain(distances).chain(std::iter::once(better));
-        cells.chain(points.map(short)).collect()
+        std::iter::once(name).chain(distances).chain([better]).chain(points.map(short))
     };
-    let rows: Vec<Vec<String>> = robots.iter().map(row).collect();
     html! {
         p { "Every method and model. Methods that differ by less than their scatter have found the same robot." }
-        (page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], &rows))
+        (page::table(&["distances, mm", "mean", "std", "max", "min", "better by", "point mean", "point max"], robots.map(row)))
     }
 }
 
@@ -106,12 +103,12 @@ fn gain(before: &Spread, after: &Spread) -> Option<String> {
 }
 
 pub(super) fn expected_table(expected: &Expected) -> Markup {
-    let row = |what: &str, mm: f64| vec![what.to_owned(), two_digits(mm)];
+    let row = |what: &str, mm: f64| [what.to_owned(), two_digits(mm)];
     html! {
         p { "The position error to expect of the identified robot at poses like these, after one rigid fit to each placement, from the \
              covariance of the parameters and what is left of the residuals. It holds within " (expected.poses)
             "; beyond, the corrections hold only as far as the model is right." }
-        (page::table(&["error to expect", "mm"], &[
+        (page::table(&["error to expect", "mm"], [
             row("mean", expected.mean_mm),
             row("95 of 100 errors are below", expected.p95_mm),
             row("mean at the worst pose", expected.max_mm),
@@ -141,30 +138,28 @@ pub(super) fn parameter_table(record: &Record) -> Markup {
             Some(sigma) => with_sigma(p.delta, sigma),
             None => [number(Some(p.delta), 4), "n/a".to_owned()],
         };
-        vec![p.name.clone(), p.unit.to_owned(), number(Some(p.nominal), 4), delta, sigma, state.to_owned()]
+        [p.name.clone(), p.unit.to_owned(), number(Some(p.nominal), 4), delta, sigma, state.to_owned()]
     };
-    let rows: Vec<Vec<String>> = method.parameters.iter().map(row).collect();
-    page::table(&["parameter", "unit", "nominal", "correction", "sigma", ""], &rows)
+    page::table(&["parameter", "unit", "nominal", "correction", "sigma", ""], method.parameters.iter().map(row))
 }
 
 pub(super) fn rank_table(record: &Record) -> Markup {
     let i = &record.identifiability;
     let list = |names: &[String]| if names.is_empty() { "none".to_owned() } else { names.join("; ") };
     let mut rows = vec![
-        vec!["rank".to_owned(), format!("{} of {}", i.rank, i.parameters)],
-        vec!["not determined".to_owned(), list(&i.zero)],
-        vec!["determined as sums".to_owned(), list(&i.dependent)],
-        vec!["hardly determined".to_owned(), list(&i.weak)],
-        vec!["condition".to_owned(), number(i.condition, 1)],
+        ("rank", format!("{} of {}", i.rank, i.parameters)),
+        ("not determined", list(&i.zero)),
+        ("determined as sums", list(&i.dependent)),
+        ("hardly determined", list(&i.weak)),
+        ("condition", number(i.condition, 1)),
     ];
     if let Some(o) = &i.observability {
-        for (name, value) in [("O1", o.o1), ("O2", o.o2), ("O3", o.o3), ("O4", o.o4), ("O5", o.o5)] {
-            rows.push(vec![name.to_owned(), format!("{value:.3e}")]);
-        }
+        let indices = [("O1", o.o1), ("O2", o.o2), ("O3", o.o3), ("O4", o.o4), ("O5", o.o5)];
+        rows.extend(indices.map(|(name, value)| (name, format!("{value:.3e}"))));
     }
     html! {
         p { "Observability indices O1 to O5 of the base parameters (Sun and Hollerbach, 2008), mm a mm or mrad: larger is better; a condition in the thousands asks for poses with more varied orientation." }
-        (page::table(&["", ""], &rows))
+        (page::table(&["", ""], rows.into_iter().map(|(name, value)| [name.to_owned(), value])))
     }
 }
 
@@ -177,29 +172,25 @@ pub(super) fn joint_table(record: &Record) -> Markup {
         Some(p) => format!("{:.4}", p.nominal),
         None => String::new(),
     };
-    let rows: Vec<Vec<String>> = (1..)
-        .map_while(|j| {
-            find(format!("theta_{j}"))?;
-            let link = j - 1;
-            let cells =
-                [format!("alpha_{link}"), format!("a_{link}"), format!("theta_{j}"), format!("d_{j}")].map(&cell);
-            Some(std::iter::once(j.to_string()).chain(cells).collect())
-        })
-        .collect();
-    page::table(&["j", "alpha, deg", "a, mm", "theta, deg", "d, mm"], &rows)
+    let rows = (1..).map_while(|j| {
+        find(format!("theta_{j}"))?;
+        let link = j - 1;
+        let cells = [format!("alpha_{link}"), format!("a_{link}"), format!("theta_{j}"), format!("d_{j}")].map(&cell);
+        Some(std::iter::once(j.to_string()).chain(cells))
+    });
+    page::table(&["j", "alpha, deg", "a, mm", "theta, deg", "d, mm"], rows)
 }
 
 pub(super) fn judged_table(record: &Record) -> Markup {
     let row = |j: &crate::identify::run::Judged| {
         let mark = if j.terms == record.terms { " (kept)" } else { "" };
-        vec![j.model.to_owned(), format!("{}{mark}", j.terms), short(j.held_out_mm)]
+        [j.model.to_owned(), format!("{}{mark}", j.terms), short(j.held_out_mm)]
     };
-    let rows: Vec<Vec<String>> = record.judged.iter().map(row).collect();
-    if rows.is_empty() {
+    if record.judged.is_empty() {
         return html! { p { "Model, terms and method were given." } };
     }
     html! {
         p { "Root mean square error on samples that were held out of the fit, mm. More terms are taken only where this falls and the data make them much more probable than what they are added to. The methods all solve the same problem: the cheapest of those that end at the least cost is kept." }
-        (page::table(&["model", "terms", "held-out error, mm"], &rows))
+        (page::table(&["model", "terms", "held-out error, mm"], record.judged.iter().map(row)))
     }
 }

@@ -54,10 +54,7 @@ pub struct Layer {
 impl Scene<'_> {
     /// All layers in front of the backdrop, from behind to before, as this camera sees them.
     pub fn layers(&self) -> Vec<Layer> {
-        let mut layers = Vec::new();
-        for patch in self.holder {
-            layers.extend(self.patch_layer(patch));
-        }
+        let mut layers: Vec<Layer> = self.holder.iter().filter_map(|patch| self.patch_layer(patch)).collect();
         let (w, h) = self.board.plate_half_mm();
         layers.extend(self.plate_layer(w + self.print.rim_mm, h + self.print.rim_mm, self.print.rim));
         layers.extend(self.plate_layer(w, h, self.print.white));
