@@ -85,14 +85,14 @@ impl Reading {
         self.count() < needed && other.count() >= needed && told && apart
     }
 
-    /// Whether these are names of a folder that holds `left/` and `right/` as well, which are what is read of it.
+    /// Whether these are names of a folder that holds `left/` and `right/` as well, with no fewer pairs: those are what is read of it.
     fn is_beside_sides(&self, other: &Reading) -> bool {
         let ([folder], [left, right]) = (self.places.as_slice(), other.places.as_slice()) else { return false };
         let is = |side: &Utf8Path, word: &str| {
             side.parent() == Some(folder.as_path())
                 && side.file_name().is_some_and(|name| name.eq_ignore_ascii_case(word))
         };
-        is(left, "left") && is(right, "right")
+        is(left, "left") && is(right, "right") && other.count() >= self.count()
     }
 
     /// Whether these pictures were made of those of another reading: their folders say so, and they have their names.
@@ -307,10 +307,9 @@ fn without(tokens: &[&str], place: usize) -> String {
 pub fn choose(mut readings: Vec<Reading>, needed: usize) -> Vec<Reading> {
     readings.retain(|reading| reading.count() > 0);
     let all = readings.clone();
-    readings.retain(|r| !all.iter().any(|other| r.is_stray_beside(other, needed)));
-    // Of what is left: `left/` and `right/` with too few pairs do not stand for their folder.
-    let all = readings.clone();
-    readings.retain(|r| !all.iter().any(|other| r.is_beside_sides(other) || r.is_made_of(other)));
+    let gives_way =
+        |r: &Reading, to: &Reading| r.is_stray_beside(to, needed) || r.is_beside_sides(to) || r.is_made_of(to);
+    readings.retain(|r| !all.iter().any(|other| gives_way(r, other)));
     let Some(best) = readings.iter().min_by_key(|r| (r.told, r.depth)).cloned() else { return Vec::new() };
     readings.retain(|r| {
         // Names in the folder itself were always read, whatever lay below.
