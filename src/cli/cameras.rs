@@ -37,14 +37,14 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// Where the pictures are.
+    /// Where the pictures are; any number of pairs is of use.
     pub fn source<'a>(&'a self, command: &'a str, images: &'a Utf8Path) -> Source<'a> {
         let halves = match (self.side_by_side, self.top_bottom) {
             (true, _) => Some(Halves::SideBySide),
             (_, true) => Some(Halves::TopBottom),
             _ => None,
         };
-        Source { command, images, right: self.right.as_deref(), by: self.pair_by, halves }
+        Source { right: self.right.as_deref(), by: self.pair_by, halves, ..Source::folder(command, images) }
     }
 }
 

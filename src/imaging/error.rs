@@ -172,8 +172,9 @@ impl Explain for Error {
             }
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
-            Error::NotCounted { .. } => {
-                Some("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`".to_owned())
+            Error::NotCounted { counts, .. } => {
+                let none = if counts.is_empty() { "; grids of circles are not read" } else { "" };
+                Some(format!("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`{none}"))
             }
             Error::TooFewPairs { skipped, .. }
                 if 2 * skipped.iter().filter(|s| s.reason.contains(super::image::UNDECODABLE)).count() > skipped.len() =>

@@ -93,6 +93,36 @@ fn measure_finds_the_poses_beside_two_folders() {
     };
     let one = measure(&["world/poses"], "one");
     assert!(measure(&["world/poses/left", "world/poses/right"], "two") == one);
+    few_pairs_give_way_where_more_are_needed(root);
+}
+
+/// Of these pictures, which are empty, only what is taken is looked at: four pairs calibrate, three do with known lenses, two say whether a rig still
+/// holds, and measure takes any number.
+fn few_pairs_give_way_where_more_are_needed(root: &Path) {
+    let pairs = |folder: &str, count: usize| {
+        std::fs::create_dir_all(root.join(folder)).unwrap();
+        for name in (0..count).flat_map(|k| [format!("left{k}.png"), format!("right{k}.png")]) {
+            std::fs::write(root.join(folder).join(name), "").unwrap();
+        }
+    };
+    for (set, few) in [(9, 3), (9, 2), (2, 1)] {
+        pairs(&format!("of_{few}/set"), set);
+        pairs(&format!("of_{few}/demo"), few);
+        std::fs::copy(root.join("world/poses/poses.csv"), root.join(format!("of_{few}/poses.csv"))).unwrap();
+    }
+    let truth = "world/truth/calibration.json";
+    for (arguments, taken) in [
+        (["camera-check", "of_3", "--out", "none"], Some("9 pairs by name: left set/left*.png")),
+        (["camera-check", "of_3", "--intrinsics", truth], None),
+        (["camera-check", "of_2", "--intrinsics", truth], Some("9 pairs by name: left set/left*.png")),
+        (["camera-check", "of_2", "--against", truth], None),
+        (["camera-check", "of_1", "--against", truth], Some("2 pairs by name: left set/left*.png")),
+        (["measure", "of_1", "--calibration", truth], None),
+    ] {
+        let said = stderr(&stereocal(root, &arguments));
+        assert_eq!(said.contains("; not taken: demo/ ("), taken.is_some(), "{arguments:?}: {said}");
+        assert!(said.contains(taken.unwrap_or("these pictures can be read in 2 ways")), "{arguments:?}: {said}");
+    }
 }
 
 #[test]

@@ -45,14 +45,14 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let mut demand = demand(args, config)?;
     let out = open(args, config, run)?;
 
-    let pairing = pairing(args, &out)?;
+    let known = known_lenses(args)?;
+    let pairing = pairing(args, known.as_ref(), &out)?;
     let (board, by_caliper_mm) = board(args, config, pairing.as_ref())?;
     demand.board_uncertainty_mm = demand.board_uncertainty_mm.or(by_caliper_mm);
     demand.size_assumed = size_assumed(args, config);
     demand.size_assumed.iter().for_each(progress::warn);
     demand.lens_pairs = pairs_of_lenses(args, pairing.as_ref(), &out);
     demand.lens_pairs.statement().iter().for_each(progress::warn);
-    let known = known_lenses(args)?;
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
     known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
     let asked = Asked { options: options(args, known), tolerance_mm: demand.tolerance_mm, extent: demand.extent };
@@ -226,9 +226,10 @@ fn known_lenses(args: &CameraCheck) -> Result<Option<KnownLenses>> {
 }
 
 /// The pairs of pictures, where there are pictures.
-fn pairing(args: &CameraCheck, out: &OutDir) -> Result<Option<Pairing>> {
+fn pairing(args: &CameraCheck, known: Option<&KnownLenses>, out: &OutDir) -> Result<Option<Pairing>> {
     let Some(images) = &args.images else { return Ok(None) };
-    let pairing = args.pairs.source("camera-check", images).pairs(out)?;
+    let source = Source { needed: fewest_pairs(known), ..args.pairs.source("camera-check", images) };
+    let pairing = source.pairs(out)?;
     progress::note(&pairing.taken);
     let names: Vec<String> = pairing.pairs.iter().map(|files| files.pair.clone()).collect();
     moves::check_names(&args.known_move, &names)?;

@@ -15,7 +15,7 @@ use crate::formats::recheck::{self as formats, Check, HISTORY, Standing};
 use crate::imaging::corners::named;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
-use crate::imaging::input::pairs::{PairFiles, Pairing};
+use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
 use crate::imaging::{Corners, Wanted, find_corners};
 use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::pairs::open_numbers;
@@ -147,7 +147,8 @@ fn corners(
     // The command line asks for one of the two.
     let nothing = || config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] };
     let images = args.images.as_ref().ok_or_else(nothing)?;
-    let mut pairing = args.pairs.source("camera-check", images).pairs(out)?;
+    let source = Source { needed: FEWEST_PAIRS, ..args.pairs.source("camera-check", images) };
+    let mut pairing = source.pairs(out)?;
     progress::note(&pairing.taken);
     let own = Own::among(&mut pairing, calibration);
     let board = board(Some(&pairing))?;

@@ -110,15 +110,16 @@ fn found(holding: &[&Folder]) -> String {
     text
 }
 
-/// Several readings are as good.
-pub fn several(source: &Source<'_>, readings: &[Reading]) -> Error {
+/// Several readings are as good. `is_read_alone` says whether the folders of one, when they are named, are read in the same way.
+pub fn several(source: &Source<'_>, readings: &[Reading], is_read_alone: impl Fn(&Reading) -> bool) -> Error {
+    let flags = source.by.map_or_else(String::new, |by| format!("--pair-by {}", by.word()));
     let mut statement = format!("these pictures can be read in {} ways", readings.len());
     let mut calls = Vec::new();
     for reading in readings.iter().take(MOST_SHOWN) {
         statement.push_str(&format!("\n  {}", taken(reading, source.images)));
-        let places: Vec<&Utf8Path> = reading.places.iter().map(Utf8PathBuf::as_path).collect();
-        if places != [source.images] {
-            calls.push(call(source, &places, ""));
+        if is_read_alone(reading) {
+            let places: Vec<&Utf8Path> = reading.places.iter().map(Utf8PathBuf::as_path).collect();
+            calls.push(call(source, &places, &flags));
         }
     }
     if readings.len() > MOST_SHOWN {

@@ -35,13 +35,24 @@ impl Source<'_> {
                 Err(e) => refused = refused.or(Some(e)),
             }
         }
-        let mut best = readings::choose(tried.clone());
+        let mut best = readings::choose(tried.clone(), self.needed);
         match (best.len(), refused) {
             (0, Some(e)) => Err(e),
             (0, None) => Err(explain::none(self, &folders, &tried)),
             (1, _) => self.one(best.remove(0), &folders),
-            _ => Err(explain::several(self, &best)),
+            _ => Err(explain::several(self, &best, |reading| self.is_read_alone(reading))),
         }
+    }
+
+    /// Whether the folders of a reading, when they are named, are read as it reads them.
+    fn is_read_alone(&self, reading: &Reading) -> bool {
+        let (images, right) = match reading.places.as_slice() {
+            [images] if images != self.images => (images, None),
+            [left, right] => (left, Some(right.as_path())),
+            _ => return false,
+        };
+        let alone = Source { images, right, ..*self }.whole_pictures();
+        alone.is_ok_and(|found| found.pairs == reading.matched.pairs)
     }
 
     /// A reading without a rival.

@@ -17,6 +17,8 @@ mod names;
 mod pairing;
 mod readings;
 #[cfg(test)]
+mod rivals;
+#[cfg(test)]
 mod tests;
 
 pub use names::natural_order;

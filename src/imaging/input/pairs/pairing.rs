@@ -44,6 +44,8 @@ pub struct Source<'a> {
     pub by: Option<PairBy>,
     /// How each picture holds both views, if it does.
     pub halves: Option<Halves>,
+    /// How many pairs are of use: fewer give way to as many that lie elsewhere.
+    pub needed: usize,
 }
 
 /// How a picture holds both views.
@@ -92,7 +94,7 @@ pub struct Pairing {
 impl<'a> Source<'a> {
     /// One folder, read as it is.
     pub fn folder(command: &'a str, images: &'a Utf8Path) -> Source<'a> {
-        Source { command, images, right: None, by: None, halves: None }
+        Source { command, images, right: None, by: None, halves: None, needed: 1 }
     }
 
     /// The folders that were named.

@@ -2,11 +2,12 @@
 //!
 //! In: the folders that hold pictures. Out: every reading with at least one pair: two folders, one folder whose names say the side, or a folder
 //! for each pair, with what told left from right. Words tell most, then letters, then two names that differ in one number or letter, then nothing but that
-//! there are two. [`choose`] takes the best of them, or says that several are as good.
+//! there are two. [`choose`] takes the best of them, or says that several are as good: a few stray pairs, or results that lie beside the
+//! pictures that they were made of, are no rivals.
 
 use std::collections::BTreeMap;
 
-use camino::Utf8PathBuf;
+use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder};
 use super::matching::{self, Matched, by_key};
@@ -19,6 +20,20 @@ const MOST_COMPARED: usize = 32;
 
 /// Folders of two pictures each from which on they are those of pairs: nobody has so many cameras and two pictures of each.
 const PAIRS_AT_LEAST: usize = 5;
+
+/// Words by which a folder says that its pictures were made of others.
+const MADE: [&str; 10] = [
+    "rectified",
+    "undistorted",
+    "corners",
+    "output",
+    "outputs",
+    "result",
+    "results",
+    "overlay",
+    "overlays",
+    "disparity",
+];
 
 /// What tells left from right, the strongest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -60,6 +75,35 @@ impl Reading {
     /// How many pairs it finds.
     pub fn count(&self) -> usize {
         self.matched.pairs.len()
+    }
+
+    /// Whether these are some pairs beside another reading: too few, where that one has enough and its names tell the sides, or tell as much. What
+    /// is then left out lies in a folder of its own; the same pictures read in another way stay a rival.
+    fn is_stray_beside(&self, other: &Reading, needed: usize) -> bool {
+        let apart = self.places.iter().any(|place| !other.places.contains(place));
+        let told = other.told <= self.told.max(Told::Letters);
+        self.count() < needed && other.count() >= needed && told && apart
+    }
+
+    /// Whether these are names of a folder that holds `left/` and `right/` as well, with no fewer pairs: those are what is read of it.
+    fn is_beside_sides(&self, other: &Reading) -> bool {
+        let ([folder], [left, right]) = (self.places.as_slice(), other.places.as_slice()) else { return false };
+        let is = |side: &Utf8Path, word: &str| {
+            side.parent() == Some(folder.as_path())
+                && side.file_name().is_some_and(|name| name.eq_ignore_ascii_case(word))
+        };
+        is(left, "left") && is(right, "right") && other.count() >= self.count()
+    }
+
+    /// Whether these pictures were made of those of another reading: their folders say so, and they have their names.
+    fn is_made_of(&self, other: &Reading) -> bool {
+        let made = |path: &str| tokens(path).iter().any(|word| MADE.iter().any(|made| made.eq_ignore_ascii_case(word)));
+        let of = |place: &Utf8PathBuf| {
+            let mut differing = other.places.iter().map(|raw| apart(place.as_str(), raw.as_str()));
+            differing.all(|[mine, theirs]| made(mine) && !made(theirs))
+        };
+        let named = |pair: &PairFiles| other.matched.pairs.iter().any(|raw| raw.pair == pair.pair);
+        other.told <= self.told && self.places.iter().all(of) && self.matched.pairs.iter().all(named)
     }
 }
 
@@ -259,16 +303,22 @@ fn without(tokens: &[&str], place: usize) -> String {
     before + if met { after.trim_start_matches(SEPARATORS) } else { &after }
 }
 
-/// The best reading, or all that are as good: none of them is to be preferred without being told.
-pub fn choose(mut readings: Vec<Reading>) -> Vec<Reading> {
+/// The best reading, or all that are as good: none of them is to be preferred without being told. `needed` is how many pairs are of use.
+pub fn choose(mut readings: Vec<Reading>, needed: usize) -> Vec<Reading> {
     readings.retain(|reading| reading.count() > 0);
+    let all = readings.clone();
+    let gives_way =
+        |r: &Reading, to: &Reading| r.is_stray_beside(to, needed) || r.is_beside_sides(to) || r.is_made_of(to);
+    readings.retain(|r| !all.iter().any(|other| gives_way(r, other)));
     let Some(best) = readings.iter().min_by_key(|r| (r.told, r.depth)).cloned() else { return Vec::new() };
     readings.retain(|r| {
         // Names in the folder itself were always read, whatever lay below.
         let itself = best.depth == 0 && r.depth > 0;
         let equal = r.told == best.told && (!itself || r.count() > best.count());
         let nearer = r.told > best.told && r.depth < best.depth && r.count() >= best.count();
-        equal || nearer
+        // Too few whose names tell the sides, and enough whose names do not.
+        let enough = best.count() < needed && r.count() >= needed;
+        equal || nearer || enough
     });
     readings.sort_by_key(|r| (r.told, r.depth));
     readings
