@@ -9,7 +9,7 @@ use crate::config::Config;
 use crate::diagnostic::{Explain, Status};
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
-use crate::formats::robots::{dh_csv, urdf};
+use crate::formats::robots::{dh_csv, ros_kinematics, urdf};
 use crate::measurements::{Measurement, Observed, Source, is_not_near};
 use crate::progress;
 use crate::report::robot as report;
@@ -37,7 +37,10 @@ fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
         let description = urdf::Urdf::read(&args.file)?;
         description.chain(args.tip.as_deref())?.robot(&description.name)
     } else {
-        table(args, name)?
+        match ros_kinematics::read(&args.file, name)? {
+            Some(robot) => robot,
+            None => table(args, name)?,
+        }
     };
     write(&robot, &args.place, config, run, &[&args.file])
 }

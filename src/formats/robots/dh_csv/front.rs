@@ -10,6 +10,7 @@ use super::table::Table;
 use crate::files::{self, Result};
 use crate::formats::robots::dh_text::{self, Known, Links, Text};
 use crate::formats::robots::dh_words::Words;
+use crate::formats::robots::ur_calibration;
 use crate::tables::expression::{self, Value};
 use crate::tables::header::{self, Headed};
 use crate::tables::names::Unit;
@@ -66,6 +67,9 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
     let refuse = |(line, message): dh_text::Wrong| empty(path).refuse(line, message, Some(HINT));
     let read = dh_text::read(&text, is(&PROSE)).map_err(refuse)?;
     let given = given(asked);
+    if let (None, Some((line, what))) = (&read.links, ur_calibration::deviations(&text)) {
+        return Err(empty(path).refuse(line, what, Some(ur_calibration::HINT)));
+    }
     if let (Some(links), None) = (&read.links, &given) {
         return Ok(vec![of_links(path, &read, links, asked)?]);
     }
