@@ -61,6 +61,7 @@ fn take(args: &RobotImport, name: &str, (reading, convention): Way, why: &str) -
         return Err(refuse(args, format!("{} ({})", open.message, reading.said), open.hint).into());
     }
     progress::note(format!("{}: {}, {} convention ({why})", args.file, reading.said, convention.name()));
+    reading.offsets.iter().for_each(|said| progress::note(format!("{}: {said}", args.file)));
     reading.ends_said.iter().for_each(|said| progress::warn(format!("{}: {said}", args.file)));
     Ok(reading.robot(name, convention))
 }
