@@ -221,7 +221,7 @@ mod tests {
     }
 
     /// Keys in any order, as programs write them that sort them, and what stands beside the frames.
-    const FLOW: &str = "# an arm\nother: {x: 1}\nkinematics:\n  forearm: {x: -0.3, y: 0, z: 0.001, roll: 3.13, pitch: 3.14, yaw: -3.12}\n  hash: calib_7\n  \
+    const FLOW: &str = "# an arm\nother: {x: 1}\nkinematics:\n  forearm: {x: -0.3, y: 0, z: 0.001, roll: 3.13, pitch: 3.13, yaw: -3.12}\n  hash: calib_7\n  \
         shoulder: {x: 0, y: 0, z: 0.15, roll: -0, pitch: 0, yaw: 1.0e-05}\n  upper_arm: {pitch: 0, roll: 1.57, x: 9e-05,\n    y: 0, yaw: 0.2, z: 0}\n  \
         wrist_1:\n    x: -0.25\n    y: 0\n    z: 0.11\n    roll: 0.003\n    pitch: 0  # rad\n    yaw: 0\n  wrist_2: {x: 0, y: -0.09, z: 0, roll: 1.6, pitch: 0, yaw: 0}\n  \
         wrist_3: {x: 0, y: 0.08, z: 0, roll: 1.5, pitch: 3.1, yaw: 3.1}\nx: 3\n";
@@ -234,7 +234,7 @@ mod tests {
         let frames = [
             [0.0, 0.0, 150.0, 0.0, 0.0, 1e-5],
             [0.09, 0.0, 0.0, 1.57, 0.0, 0.2],
-            [-300.0, 0.0, 1.0, 3.13, 3.14, -3.12],
+            [-300.0, 0.0, 1.0, 3.13, 3.13, -3.12],
             [-250.0, 0.0, 110.0, 0.003, 0.0, 0.0],
             [0.0, -90.0, 0.0, 1.6, 0.0, 0.0],
             [0.0, 80.0, 0.0, 1.5, 3.1, 3.1],
