@@ -206,7 +206,7 @@ pub enum RobotWhat {
 /// `stereocal robot import`
 #[derive(Debug, Args)]
 pub struct RobotImport {
-    /// A URDF (.urdf, .xml); a table of any form, columns alpha, a, theta, d in any order; or a program's or settings' text with such parameters
+    /// A URDF (.urdf, .xml); the kinematics file of ROS (ur_description); a table of any form, columns alpha, a, theta, d in any order; or a program's or settings' text with such parameters
     pub file: Utf8PathBuf,
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]

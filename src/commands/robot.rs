@@ -7,9 +7,9 @@ use super::{Outcome, Result};
 use crate::cli::{DhConvention, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
 use crate::config::Config;
 use crate::diagnostic::{Explain, Status};
-use crate::files::OutDir;
 use crate::files::provenance::Run;
-use crate::formats::robots::{dh_csv, urdf};
+use crate::files::{self, OutDir};
+use crate::formats::robots::{dh_csv, ros_kinematics, urdf};
 use crate::measurements::{Measurement, Observed, Source, is_not_near};
 use crate::progress;
 use crate::report::robot as report;
@@ -36,7 +36,10 @@ fn import(args: &RobotImport, config: &Config, run: Run) -> Result<String> {
         let description = urdf::Urdf::read(&args.file)?;
         description.chain(args.tip.as_deref())?.robot(&description.name)
     } else {
-        table(args, name)?
+        match ros_kinematics::read(&args.file, name)? {
+            Some(robot) => robot,
+            None => table(args, name)?,
+        }
     };
     write(&robot, &args.place, config, run, &[&args.file])
 }
@@ -57,6 +60,7 @@ fn take(args: &RobotImport, name: &str, (reading, convention): Way, why: &str) -
         return Err(refuse(args, format!("{} ({})", open.message, reading.said), open.hint).into());
     }
     progress::note(format!("{}: {}, {} convention ({why})", args.file, reading.said, convention.name()));
+    reading.offsets.iter().for_each(|said| progress::note(format!("{}: {said}", args.file)));
     reading.ends_said.iter().for_each(|said| progress::warn(format!("{}: {said}", args.file)));
     Ok(reading.robot(name, convention))
 }

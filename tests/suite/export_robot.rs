@@ -116,9 +116,13 @@ fn what_a_format_cannot_carry_is_said_in_mm() {
     let [near, far] = ["near", "again"]
         .map(|folder| Residual::between(&there, &chain(at, &format!("{folder}/robot.urdf"), None)).mean_mm);
     assert!(near < 0.3 * far, "{near} {far}");
-    run(at, &["robot", "import", "plain-dh-csv/robot.csv", "--out", "table"], 0);
-    let off = Residual::between(&read(at, "plain.toml"), &read(at, "table/robot.toml"));
-    assert!(off.max_mm < 1e-9, "{off:?}");
+    for (file, out) in [("plain-dh-csv/robot.csv", "table"), ("plain-ros-kinematics-yaml/kinematics.yaml", "frames")] {
+        run(at, &["robot", "import", file, "--out", out], 0);
+        let off = Residual::between(&read(at, "plain.toml"), &read(at, &format!("{out}/robot.toml")));
+        assert!(off.max_mm < 1e-9, "{off:?}");
+    }
+    let said = run(at, &["robot", "import", "plain-ur-calibration/calibration.conf", "--out", "none"], 2);
+    assert!(said.contains("these are deviations") && said.contains("ur_calibration"), "{said}");
 }
 
 #[test]

@@ -8,6 +8,7 @@
 
 mod beside;
 mod front;
+mod latex;
 mod names;
 mod reading;
 mod table;

@@ -39,6 +39,8 @@ pub struct Text {
     pub words: Words,
     /// The names that the text sets to numbers.
     pub known: Known,
+    /// What lists of parameters lack to be links.
+    pub incomplete: Option<Wrong>,
 }
 
 /// Links that a text names the parameters of.
@@ -81,12 +83,12 @@ pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
         repeated::refuse_unwritten(&code, &scan.links)?;
     }
     robots::of_one(&code, &scan.links.iter().map(|link| link.line).collect::<Vec<_>>())?;
-    let known = std::mem::take(&mut scan.known);
+    let (known, incomplete) = (std::mem::take(&mut scan.known), lists::incomplete(&scan.lists));
     let mut links = links(scan, lower.contains("qlim"))?;
     if let Some(links) = links.as_mut().filter(|links| links.calls) {
         (links.ends, links.ends_said) = ends::of(&code, &known);
     }
-    Ok(Text { links, words, known })
+    Ok(Text { links, words, known, incomplete })
 }
 
 /// The links of what was read; none where there are fewer than two.

@@ -11,6 +11,28 @@ use crate::robot::{Robot, axes};
 /// Axes closer to parallel than this have no common normal to be found, rad; beta is lost there.
 const PARALLEL_SIN: f64 = 1e-7;
 
+/// What a file of deviations alone is told.
+pub const HINT: &str = "`stereocal robot new ur5e` makes the nominal robot of an arm; the calibrated one has the file that ROS makes of the controller: \
+                        `ros2 launch ur_calibration calibration_correction.launch.py robot_ip:=IP target_filename:=kinematics.yaml`, then `stereocal robot \
+                        import kinematics.yaml`; or add each deviation to the maker's theta, a, d, alpha (rad, m) and import that table with `--dh classic`";
+
+/// The line from which on a text holds such deviations, and what that is.
+pub fn deviations(text: &str) -> Option<(u64, String)> {
+    let at = |name: &str| {
+        let is_it = |line: &str| {
+            let behind =
+                line.trim_start_matches(|c: char| c.is_whitespace() || matches!(c, '"' | '{')).strip_prefix(name);
+            behind.is_some_and(|behind| behind.trim_start_matches(['"', ' ']).starts_with(['=', ':']))
+        };
+        text.lines().position(is_it)
+    };
+    let lines = ["delta_theta", "delta_a", "delta_d", "delta_alpha"].map(at);
+    let first = lines.into_iter().collect::<Option<Vec<usize>>>()?.into_iter().min()?;
+    let what = "these are deviations (delta_theta, delta_a, delta_d, delta_alpha), as in calibration.conf of Universal Robots, and no parameters: \
+                what they are added to, the nominal arm, is not in the file";
+    Some((first as u64 + 1, what.to_owned()))
+}
+
 /// The rows of a classic table: alpha and a behind the joint.
 fn classic(robot: &Robot) -> Vec<[f64; 4]> {
     let after = robot.joints.iter().skip(1).map(|j| (j.alpha_rad, j.a_mm)).chain([(0.0, 0.0)]);
@@ -60,6 +82,20 @@ mod tests {
             inner.split(',').map(|v| v.trim().parse().ok()).collect::<Option<Vec<f64>>>()
         };
         text.lines().filter_map(list).collect()
+    }
+
+    #[test]
+    fn deviations_are_told_from_parameters() {
+        let nominal = catalogue::robot("ur5e").unwrap();
+        let own = build(&nominal, &nominal).text;
+        assert_eq!(deviations(&own).map(|(line, _)| line), Some(2));
+        let controller = "[mounting]\ndelta_theta = [ 1.5e-08, 0.3]\ndelta_a = [ 2.5e-05, 0.01]\ndelta_d = [ 1e-05, 90.5]\ndelta_alpha = [ 1e-4, 2e-3]\n\
+            joint_checksum = [ 0x1f, 0x2e]\n";
+        assert!(deviations(controller).is_some_and(|(_, what)| what.contains("calibration.conf")));
+        assert!(deviations(&controller.replace(" =", ":")).is_some());
+        for none in [controller.replace("delta_", ""), controller.replace("delta_alpha", "alpha"), String::new()] {
+            assert_eq!(deviations(&none), None, "{none}");
+        }
     }
 
     /// Read as a UR reads it: nominal table plus deltas, classic.

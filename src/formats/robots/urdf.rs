@@ -10,7 +10,7 @@ use nalgebra::{Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
 use crate::files::{self, Result};
-use crate::geometry::{Transform, transform};
+use crate::geometry::Transform;
 use crate::programs::edited;
 use crate::progress;
 use crate::robot::Robot;
@@ -239,6 +239,13 @@ pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     [roll + 0.0, pitch + 0.0, yaw + 0.0]
 }
 
+/// The transform of an origin, metres and roll, pitch, yaw in radians.
+pub fn of_origin(xyz_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Transform {
+    let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
+    let rotation = turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll);
+    Transform::from_parts((Vector3::from(xyz_m) * 1000.0).into(), rotation)
+}
+
 /// An `<origin>` of a transform, metres and radians with all their digits.
 pub fn origin_element(parent_from_child: &Transform) -> String {
     let t = parent_from_child.translation.vector / 1000.0;
@@ -268,10 +275,7 @@ fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
             .filter(|v| v.iter().all(|v| v.is_finite()))
             .ok_or_else(|| format!("joint `{name}`: {attribute}=\"{text}\" is not three numbers"))
     };
-    let xyz = Vector3::from(numbers("origin", "xyz", [0.0; 3])?) * 1000.0;
-    let [roll, pitch, yaw] = numbers("origin", "rpy", [0.0; 3])?;
-    let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
-    let rotation = turn(Vector3::z(), yaw) * turn(Vector3::y(), pitch) * turn(Vector3::x(), roll);
+    let parent_from_joint = of_origin(numbers("origin", "xyz", [0.0; 3])?, numbers("origin", "rpy", [0.0; 3])?);
     let axis = Vector3::from(numbers("axis", "xyz", [1.0, 0.0, 0.0])?);
     if kind != Kind::Fixed && axis.norm() == 0.0 {
         return Err(format!("joint `{name}` has an axis of length zero"));
@@ -298,7 +302,7 @@ fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
         mimics: child_named("mimic").map(|n| n.attribute("joint").unwrap_or("another").to_owned()),
         parent: link("parent")?,
         child: link("child")?,
-        parent_from_joint: Transform::from_parts(transform(Vector3::zeros(), xyz).translation, rotation),
+        parent_from_joint,
         axis: if axis.norm() > 0.0 { axis.normalize() } else { Vector3::x() },
         limits_rad,
         line,

@@ -4,12 +4,14 @@ use std::borrow::Cow;
 
 use camino::Utf8Path;
 
+use super::latex;
 use super::names::{HINT, named};
 use super::reading::{Reading, reading};
 use super::table::Table;
 use crate::files::{self, Result};
 use crate::formats::robots::dh_text::{self, Known, Links, Text};
 use crate::formats::robots::dh_words::Words;
+use crate::formats::robots::ur_calibration;
 use crate::tables::expression::{self, Value};
 use crate::tables::header::{self, Headed};
 use crate::tables::names::Unit;
@@ -33,7 +35,7 @@ const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3
 const TABLES: [&str; 5] = ["csv", "tsv", "xlsx", "xls", "ods"];
 
 /// Extensions of texts in sentences, where words in brackets are no code.
-const PROSE: [&str; 3] = ["md", "txt", "rst"];
+const PROSE: [&str; 4] = ["md", "txt", "rst", "tex"];
 
 /// Characters that pages name.
 const ENTITIES: [(&str, &str); 8] = [
@@ -64,8 +66,16 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
     let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
     let text = without_entities(&text);
     let refuse = |(line, message): dh_text::Wrong| empty(path).refuse(line, message, Some(HINT));
+    if (is(&PROSE) || text.trim_start().starts_with('\\'))
+        && let Some(rows) = latex::table(&text).map_err(refuse)?
+    {
+        return of_grid(&Grid { rows, ..empty(path) }, asked, Some(Words::of(&text, "")));
+    }
     let read = dh_text::read(&text, is(&PROSE)).map_err(refuse)?;
     let given = given(asked);
+    if let (None, Some((line, what))) = (&read.links, ur_calibration::deviations(&text)) {
+        return Err(empty(path).refuse(line, what, Some(ur_calibration::HINT)));
+    }
     if let (Some(links), None) = (&read.links, &given) {
         return Ok(vec![of_links(path, &read, links, asked)?]);
     }
@@ -86,7 +96,8 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         let message = "the parameters have names of their own here, and no table has columns to name".to_owned();
         return Err(empty(path).refuse(*line, message, Some("leave out `--columns`")));
     }
-    of_grid(&Grid::of_text(path, alone(path, &text)?.into_owned())?, asked, Some(read.words))
+    let of_rows = of_grid(&Grid::of_text(path, alone(path, &text)?.into_owned())?, asked, Some(read.words));
+    of_rows.map_err(|error| read.incomplete.map_or(error, refuse))
 }
 
 /// Which table of several was taken.
@@ -139,10 +150,13 @@ fn without_names(table: &Table) -> Result<Vec<Reading>> {
         (0..rows[0].1.len()).filter(|&c| is_number(c) && !(table.counts(c) && rows.len() > 2)).collect();
     let [w, x, y, z] = free[..] else {
         let message = format!("{} columns of numbers without names; four are needed", free.len());
-        let hint = format!(
-            "`--columns NAME,NAME,...` names all {} in their order, of them alpha, a, d and theta; `-` skips one",
-            rows[0].1.len()
-        );
+        let width = rows[0].1.len();
+        let hint = match rows.len() > 1 && width >= 4 {
+            true => format!(
+                "`--columns NAME,NAME,...` names all {width} in their order, of them alpha, a, d and theta; `-` skips one"
+            ),
+            false => HINT.to_owned(),
+        };
         return Err(table.grid.refuse(rows[0].0, message, Some(&hint)));
     };
     let columns = [w, x, y, z];
@@ -221,6 +235,8 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     let mut found = reading(&table, [0, 1, 2, 3])?;
     found.stated = links.convention;
     found.calls = links.calls;
+    // A call says of an offset that it is one.
+    found.offsets = found.offsets.filter(|_| !links.calls);
     found.contradiction = links.contradiction.clone();
     found.flipped = links.flipped.clone();
     let flipped: Vec<String> = (1..).zip(&links.flipped).filter(|(_, f)| **f).map(|(j, _)| j.to_string()).collect();

@@ -25,10 +25,22 @@ const WORDS: [&[&str]; 4] = [
 /// Words that may stand beside a parameter's letter.
 const SAID_BESIDE: [&str; 5] = ["twist", "length", "angle", "offset", "linkoffset"];
 
+/// Letters of indices that stand below the line, and where they do.
+const BELOW: (&str, &str) = (
+    "ijn0123456789-+",
+    "\u{1d62}\u{2c7c}\u{2099}\u{2080}\u{2081}\u{2082}\u{2083}\u{2084}\u{2085}\u{2086}\u{2087}\u{2088}\u{2089}\u{208b}\u{208a}",
+);
+
 /// The columns of alpha, a, theta and d of a table with names.
 pub(super) fn named(grid: &Grid, names: &[String]) -> Result<[usize; 4]> {
     let [alpha, a, theta, d] = [0, 1, 2, 3].map(|which| find(grid, names, which));
-    Ok([alpha?, a?, theta?, d?])
+    let (alpha, a, theta, d) = (alpha?, a?, theta?, d?);
+    if plain(&names[a]).0 == ["r"] && alpha < d && d < theta && theta < a {
+        let message = "alpha, d, theta, r may be Khalil and Kleinfinger's, where d is the length and r the offset";
+        let hint = "`--columns NAME,NAME,...` names the columns in their order: alpha, a, theta and d where they are these, `-` for others";
+        return Err(grid.refuse(grid.rows.first().map_or(1, |(line, _)| *line), message.to_owned(), Some(hint)));
+    }
+    Ok([alpha, a, theta, d])
 }
 
 /// The column of a parameter.
@@ -53,9 +65,16 @@ fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
     }
 }
 
+/// A name with its indices on the line, `αᵢ₋₁` as `αi-1`.
+pub(super) fn level(name: &str) -> String {
+    let (plain, below) = BELOW;
+    let of = |c: char| below.chars().zip(plain.chars()).find(|(b, _)| *b == c).map_or(c, |(_, p)| p);
+    name.chars().map(of).collect()
+}
+
 /// Words of a name without indices and units, and its unit.
 pub(super) fn plain(name: &str) -> (Vec<String>, Option<Unit>) {
-    let name = ["<sub>", "</sub>"].iter().fold(name.to_owned(), |name, mark| name.replace(mark, " "));
+    let name = ["<sub>", "</sub>"].iter().fold(level(name), |name, mark| name.replace(mark, " "));
     let (mut words, mut unit) = names::words(&name);
     if words.len() > 1
         && let Some(found) = words.last().and_then(|w| Unit::of(w))
@@ -66,5 +85,12 @@ pub(super) fn plain(name: &str) -> (Vec<String>, Option<Unit>) {
     words.retain(|w| {
         !w.chars().all(|c| c.is_ascii_digit()) && !matches!(w.as_str(), "i" | "j" | "n" | "link" | "joint")
     });
+    // `αi` is `α_i`.
+    for word in &mut words {
+        let letter = word.strip_suffix(['i', 'j', 'n']).filter(|w| WORDS.iter().any(|known| known.contains(w)));
+        if let Some(letter) = letter.map(str::to_owned) {
+            *word = letter;
+        }
+    }
     (words, unit)
 }

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use super::beside::{Beside, Limits};
-use super::names::{NAMES, OWN, plain};
+use super::names::{NAMES, OWN, level, plain};
 use super::table::Table;
 use super::units::{Open, units};
 use crate::files::Result;
@@ -17,6 +17,9 @@ use crate::tables::names::Unit;
 /// What a row at an end of the table may have but for its joint: alpha and a that are zero, or alpha that is not.
 const PLAIN: &str = "neither twist nor length";
 const TWIST: &str = "a twist";
+
+/// How far an angle may be from a multiple of 90 deg that was rounded, deg.
+const DRAWN_DEG: f64 = 0.1;
 
 /// A way to read a table.
 #[derive(Debug, Clone, Default)]
@@ -40,6 +43,8 @@ pub struct Reading {
     pub(super) length_mm: f64,
     /// What was taken, for a sentence.
     pub said: String,
+    /// Which zero offsets were taken that may be angles of a posture.
+    pub offsets: Option<String>,
     /// The columns' names in their order, as `--columns` has them.
     pub columns: String,
     /// The convention that names or calls say, and which.
@@ -157,6 +162,7 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     }
     let stated = names.and_then(|names| of_link_before(names, columns));
     let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
+    let offsets = odd_offsets(table, columns[2], &rows, &slides).filter(|_| !own);
     let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
     order.sort_unstable();
     let columns = order.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",");
@@ -180,13 +186,33 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     }
     let (words, open) = (table.words, angles_open.or(lengths_open));
     let found = Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, ..Reading::default() };
-    Ok(Reading { stated, words, own, open, length_mm: d.converted(1.0), ..found })
+    Ok(Reading { stated, words, own, open, offsets, length_mm: d.converted(1.0), ..found })
+}
+
+/// The numbers in the place of theta that a drawing seldom has, where nothing says that they are offsets.
+fn odd_offsets(table: &Table, theta: usize, rows: &[Row], slides: &[bool]) -> Option<String> {
+    let is_offset = table.names.is_some_and(|names| names[theta].to_lowercase().contains("offset"));
+    let is_odd = |(at, row): &(usize, &Row)| {
+        let from_drawn_deg = row[2] - 90.0 * (row[2] / 90.0).round();
+        let added = table.value(&table.rows[*at].1[theta]).is_some_and(|v| v.variable);
+        from_drawn_deg.abs() > DRAWN_DEG && !(added || slides[*at])
+    };
+    let odd = rows.iter().enumerate().filter(is_odd);
+    let odd: Vec<String> = odd.map(|(at, row)| format!("{} ({:.2} deg)", at + 1, row[2])).collect();
+    (!is_offset && !odd.is_empty()).then(|| {
+        format!(
+            "theta of the table was taken as the joints' zero offsets, which are no multiples of 90 deg at joints {}: where these are angles of a \
+             posture, put the drawing's angle, mostly 0, in their place",
+            odd.join(", ")
+        )
+    })
 }
 
 /// What `a(i-1)`, `alpha_{i-1}` say.
 fn of_link_before(names: &[String], columns: [usize; 4]) -> Option<(Convention, &'static str)> {
     let before = |name: &String| {
-        let bare: String = name.chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
+        let bare: String =
+            level(name).chars().filter(|c| c.is_alphanumeric() || matches!(c, '-' | '\u{2212}')).collect();
         ["i-1", "i\u{2212}1", "j-1", "n-1"].iter().any(|index| bare.contains(index))
     };
     (before(&names[columns[0]]) || before(&names[columns[1]]))

@@ -281,3 +281,115 @@ fn joints_of_a_toolbox_slide_and_count_the_other_way() {
     let plain = one("arm.m", &text.replace(", 'flip'", ""));
     assert!(!plain.said.contains("flip") && plain.robot("arm", Convention::Classic).joints[0].sign == 1.0);
 }
+
+#[test]
+fn an_index_behind_a_letter_is_no_other_name() {
+    let rows = "1,θ1,350,0,-90\n2,θ2-90,0,420,0\n3,θ3,0,65,-90\n";
+    for header in
+        ["Joint,θi (°),di (mm),ai (mm),αi (°)", "i,θᵢ,dᵢ,aᵢ,αᵢ", "n,theta_n,dn,an,alphan", "Joint,qi,di,ri,Alphai"]
+    {
+        let found = one("dh.csv", &format!("{header}\n{rows}"));
+        assert_eq!(
+            found.rows,
+            [[-90.0, 0.0, 0.0, 350.0], [0.0, 420.0, -90.0, 0.0], [-90.0, 65.0, 0.0, 0.0]],
+            "{header}"
+        );
+        assert_eq!((found.stated, found.columns.as_str()), (None, "theta,d,a,alpha"), "{header}");
+    }
+    for header in ["Joint,θi,di,ai-1,αi-1", "Joint,θᵢ,dᵢ,aᵢ₋₁,αᵢ₋₁", "Joint,θ_i,d_i,a_{i−1},α_{i−1}"]
+    {
+        let found = one("dh.csv", &format!("{header}\n{rows}"));
+        assert_eq!(found.convention().0, Some(Convention::Modified), "{header}");
+    }
+    // Letters of others, one twice, and the notation in which d is the length.
+    for (header, words) in [
+        ("i,θi,di,bi,αi", "no column `a_mm`"),
+        ("i,φi,di,ai,αi", "no column `theta_deg`"),
+        ("i,θi,ai,ai-1,αi", "two columns `a`"),
+        ("j,αj,dj,θj,rj", "Khalil"),
+    ] {
+        let said = said("dh.csv", &format!("{header}\n{}", rows.replace("θ2-90", "0").replace('θ', "")));
+        assert!(said.contains(words) && said.contains("dh.csv:1"), "{said}");
+    }
+}
+
+/// A table as papers have it.
+const TEX: &str = "% 3 & of & a & comment\n\\section{An arm}\n\\begin{table}\\caption{Lengths}\\begin{tabular}{|c|c|}\nlink & mm \\\\ \\hline\nupper & 270 \\\\\nlower & 80\\% \\\\\n\\end{tabular}\\end{table}\n\
+    \\begin{tabular}[t]{|c|c|@{ }c|c|c|}\n\\hline\n$i$ & $\\alpha_{i-1}$ & $a_{i-1}$ [mm] & $d_i$ [mm] & \\textbf{$\\theta_i$} \\\\ \\hline\\hline\n\
+    1 & 0 & 0 & 310 & $\\theta_1^{*}$ \\\\[2pt]\n2 & $-90^\\circ$ & 25 & 0 & $\\theta_2-90^\\circ$ \\\\ \\cline{2-3}\n3 & 0 & 270 &\n 0 & $\\theta_3$ \\\\ 4 & ${-90}^{\\circ}$ & 70 & 302 & $\\theta_4$ % the wrist\n\\\\ \\bottomrule\n\\end{tabular}\n";
+
+#[test]
+fn a_table_of_a_paper_is_read_between_its_rules() {
+    let text = TEX.replace("${-90}", "$-90");
+    let found = one("dh.tex", &text);
+    let expected =
+        [[0.0, 0.0, 0.0, 310.0], [-90.0, 25.0, -90.0, 0.0], [0.0, 270.0, 0.0, 0.0], [-90.0, 70.0, 0.0, 302.0]];
+    assert_eq!((found.rows.as_slice(), found.convention().0), (&expected[..], Some(Convention::Modified)));
+    let radians = text.replace("90^\\circ", "\\frac{\\pi}{2}").replace("90^{\\circ}", "\\pi/2");
+    let found = one("dh.txt", &radians);
+    assert!(found.rows.iter().flatten().zip(expected.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-9), "{found:?}");
+    // What stands for no number, another table of a robot, and one that does not end.
+    let line = text.lines().position(|line| line.starts_with("2 &")).unwrap() + 1;
+    assert!(said("dh.tex", &text.replace("& 25 &", "& $a_1$ &")).contains(&format!("dh.tex:{line}")));
+    assert!(said("dh.tex", TEX).contains("is not a number"));
+    let table = &text[text.find("\\begin{tabular}[t]").unwrap()..];
+    assert!(said("dh.tex", &format!("{text}{table}")).contains("a second table begins here"));
+    assert!(said("dh.tex", &text.replace("\\bottomrule\n\\end{tabular}", "")).contains("has no `\\end{tabular}`"));
+}
+
+#[test]
+fn lists_in_one_line_are_rows_and_lists_of_too_few_parameters_are_named() {
+    let json = "{\"name\": \"[3]\", \"dh\": [[0, 0, 0.2, 1.5708], [0, -0.3, 0, 0], [0, 0, 0.1, 0]], \"limits\": [[-3, 3], [-2, 2], [-1, 1]]}";
+    let asked = Asked { columns: Some("theta,a,d,alpha"), ..Asked::default() };
+    for text in [json.to_owned(), json.replace(", ", ",\n  "), format!("dh = {}", &json[22..])] {
+        let found = of("dh.json", &text, asked).unwrap();
+        assert_eq!((found[0].rows.len(), found[0].rows[1]), (3, [0.0, -300.0, 0.0, 0.0]), "{text}");
+        assert!(of("dh.json", &text, Asked::default()).unwrap().len() > 1, "{text}");
+    }
+    // A row of another length.
+    assert!(said("dh.json", &json.replace("0.1, 0]]", "0.1]]")).contains("is no row of 4 numbers"));
+    let wide = said("dh.txt", "0 0 0.2 1.5708 0 -0.3 0 0\n");
+    assert!(wide.contains("a row a joint") && !wide.contains("names all"), "{wide}");
+
+    let vectors = "function [a, l, d] = dh()\n a = [0 -pi/2 0]; % twist\n l = [0 210 640];\n d = [0 0 480];\nend\n";
+    let lacking = said("dh.m", vectors);
+    assert!(
+        lacking.contains("dh.m:2") && lacking.contains("without one called `alpha`; what is called `a` holds"),
+        "{lacking}"
+    );
+    let named = one("dh.m", &vectors.replace(" a = ", " alpha = ").replace(" l = ", " a = "));
+    assert_eq!(named.rows, [[0.0, 0.0, 0.0, 0.0], [-90.0, 210.0, 0.0, 0.0], [0.0, 640.0, 0.0, 480.0]]);
+    assert!(!said("dh.m", &vectors.replace("d = [0 0 480]", "d = [0 480]")).contains("without one called"));
+}
+
+#[test]
+fn deviations_from_a_table_are_none() {
+    let text = "[mounting]\ndelta_theta = [ 1e-5, 0.2, -0.2]\ndelta_a = [ 2e-5, 0.3, 0.0]\ndelta_d = [ 1e-4, 80.5, -80.5]\ndelta_alpha = [ 3e-4, 0.001, 0.0]\n";
+    for columns in [None, Some("alpha,a,theta"), Some("alpha,a,d,theta")] {
+        let asked = Asked { columns, ..Asked::default() };
+        let said = crate::diagnostic::report(&of("calibration.conf", text, asked).unwrap_err());
+        assert!(said.contains("conf:2") && said.contains("deviations") && said.contains("kinematics.yaml"), "{said}");
+    }
+    assert_eq!(one("dh.conf", &text.replace("delta_", "")).rows.len(), 3);
+}
+
+#[test]
+fn zero_offsets_that_may_be_a_posture_are_named() {
+    let posture = "dh = [\n {'a': 0, 'alpha': pi/2, 'd': 0.3, 'theta': 0.1},\n {'a': 0.4, 'alpha': 0, 'd': 0, 'theta': 0.2 + pi/2},\n {'a': 0, 'alpha': 0, 'd': 0.1, 'theta': pi}]\n";
+    let said = one("arm.py", posture).offsets.unwrap();
+    assert!(said.contains("1 (5.73 deg), 2 (101.46 deg):") && said.contains("zero offsets"), "{said}");
+    for drawn in [
+        posture.replace("0.1}", "0}").replace("0.2 + pi/2", "1.57"),
+        posture.replace("theta': ", "theta': q1 + "),
+        posture.replace("0.1}", "0}").replace("0.2 + ", "-"),
+    ] {
+        assert_eq!(one("arm.py", &drawn).offsets, None, "{drawn}");
+    }
+    let table = |theta: &str| format!("alpha,a,{theta},d\n90,0,12.5,300\n0,400,0,0\n0,0,0,100\n");
+    assert!(one("dh.csv", &table("theta")).offsets.is_some());
+    assert_eq!(one("dh.csv", &table("theta offset")).offsets, None);
+    assert_eq!(
+        one("arm.m", "L(1) = Link('d', 0.3, 'alpha', pi/2, 'offset', 0.3);\nL(2) = Link('a', 0.4);\n").offsets,
+        None
+    );
+}

@@ -84,6 +84,23 @@ pub(super) fn links(plain: &Lists, families: &BTreeMap<String, Lists>) -> Result
     Ok((0..alpha.len()).map(link).collect())
 }
 
+/// What lists of two parameters lack of the three that every table has.
+pub(super) fn incomplete(lists: &Lists) -> Option<Wrong> {
+    const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
+    let (here, lack): (Vec<usize>, Vec<usize>) = [0, 1, 3].into_iter().partition(|which| lists[*which].is_some());
+    let ([one, other], [lack]) = (&here[..], &lack[..]) else { return None };
+    let (line, list) = lists[*one].as_ref()?;
+    let length = lists[*other].as_ref().map(|(_, list)| list.len());
+    // A twist may be called `a` where the length has another letter.
+    let turns = *one == 1 && list.iter().any(|v| v.radians);
+    let twist = if turns { "; what is called `a` holds angles, which would be alpha" } else { "" };
+    let message = format!(
+        "the lists `{}` and `{}` stand here without one called `{}`{twist}: lists called alpha, a, d and theta are read",
+        NAMES[*one], NAMES[*other], NAMES[*lack]
+    );
+    (list.len() > 1 && length == Some(list.len())).then_some((*line, message))
+}
+
 /// Line and value by the number, of each parameter.
 pub(super) type Numbered = [BTreeMap<usize, (u64, Value)>; 4];
 

@@ -37,9 +37,51 @@ enum Line<'a> {
     Other { code: &'a str, list: bool },
 }
 
-/// The longest run of lines that hold `width` numbers each; none where there are fewer than two.
+/// The longest run of lines that hold `width` numbers each, or where there is none of lists in one line; none where there are fewer than two.
 pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>, Wrong> {
-    let lines: Vec<&str> = text.lines().collect();
+    match of_lines(&(1..).zip(text.lines()).collect::<Vec<_>>(), known, width)? {
+        None => of_lines(&apart(text), known, width),
+        found => Ok(found),
+    }
+}
+
+/// Bytes to the next list, where what ends at `end` is one and another follows.
+fn next_list(text: &str, end: usize) -> Option<usize> {
+    let next = text[end..].trim_start().strip_prefix(',')?.trim_start();
+    next.starts_with(['[', '{']).then(|| text.len() - next.len())
+}
+
+/// Bytes to what follows the first list: another one, or something else behind the end of all of them.
+fn behind_list(text: &str) -> Option<usize> {
+    text.match_indices([']', '}']).find_map(|(at, _)| {
+        let closes = |c: char| matches!(c, ']' | '}');
+        let rest = text[at + 1..].trim_start_matches(|c: char| closes(c) || c.is_whitespace());
+        let ends_all = text[at + 1..].trim_start().starts_with(closes) && !rest.is_empty();
+        if ends_all { Some(text.len() - rest.len()) } else { next_list(text, at + 1) }
+    })
+}
+
+/// The lines of a text with their numbers, those with lists in a list cut behind each; those of JSON wherever its lines end.
+fn apart(text: &str) -> Vec<(u64, &str)> {
+    let whole =
+        if text.trim_start().starts_with(['[', '{']) { vec![text] } else { text.split_inclusive('\n').collect() };
+    let (mut pieces, mut line) = (Vec::new(), 1);
+    for mut rest in whole {
+        let of_lists = rest.trim_start().starts_with(['[', '{']) || rest.contains("[[") || rest.contains("{{");
+        while let Some(at) = behind_list(rest).filter(|_| of_lists) {
+            pieces.push((line, &rest[..at]));
+            line += rest[..at].matches('\n').count() as u64;
+            rest = &rest[at..];
+        }
+        pieces.push((line, rest));
+        line += rest.matches('\n').count() as u64;
+    }
+    pieces
+}
+
+fn of_lines(numbered: &[(u64, &str)], known: &Known, width: usize) -> Result<Option<Matrix>, Wrong> {
+    let lines: Vec<&str> = numbered.iter().map(|(_, line)| *line).collect();
+    let number = |at: usize| numbered[at].0;
     let mut read: Vec<(usize, Line)> = Vec::with_capacity(lines.len());
     let mut depth = 0usize;
     for line in &lines {
@@ -62,9 +104,9 @@ pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>,
     if let Some(second) = second {
         let message = format!(
             "a second table of numbers begins here; another is at line {}, and which is the robot's is not said",
-            run.start + 1
+            number(run.start)
         );
-        return Err((second.start as u64 + 1, message + ": leave one of them in the file"));
+        return Err((number(second.start), message + ": leave one of them in the file"));
     }
     let alike = |at: usize| {
         let indented = |at: usize| lines[at].len() - lines[at].trim_start().len();
@@ -78,15 +120,15 @@ pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>,
             Line::Other { code, .. } => format!("`{code}` is no row of {width} numbers, but stands among such rows"),
             _ => continue,
         };
-        return Err((at as u64 + 1, wrong + ", and without this row it is another robot"));
+        return Err((number(at), wrong + ", and without this row it is another robot"));
     }
     let cells = |at: usize| match &read[at].1 {
-        Line::Row(cells) => Some((at as u64 + 1, Fields::new(cells))),
+        Line::Row(cells) => Some((number(at), Fields::new(cells))),
         _ => None,
     };
     let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
     let others = tables().filter(|other| *other != run && rows(other) >= OF_A_ROBOT);
-    let others = others.map(|other| other.start as u64 + 1).collect();
+    let others = others.map(|other| number(other.start)).collect();
     Ok(Some(Matrix { others, rows: run.clone().filter_map(cells).collect(), names: named }))
 }
 
@@ -124,6 +166,11 @@ fn of<'a>(line: &'a str, code: &'a str, known: &Known, width: usize) -> Line<'a>
     let is_rule = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')' | ',' | ';' | ' ' | '-' | '=' | '+' | '|');
     if code.chars().all(is_rule) {
         return Line::Nothing { empty: line.trim().is_empty() };
+    }
+    // Of two rows in a line the first is none less.
+    let ends = || code.match_indices([']', '}']).map(|(at, _)| at + 1);
+    if code.starts_with(['[', '{']) && ends().any(|end| next_list(code, end).is_some()) {
+        return Line::Other { code, list: true };
     }
     let bracketed = code.rfind(['[', '{']).map(|at| &code[at + 1..]);
     let mut inside = bracketed.unwrap_or(code).trim();

@@ -323,3 +323,20 @@ fn repeated_links_are_written_out_or_refused_with_their_line() {
     let after = format!("[{link}]\nfor i=1:3\nx = i;\nend\nL2 = {link}\nfor l in L:\n    print(l)");
     assert_eq!(count(&after), Ok(3));
 }
+
+#[test]
+fn rows_that_share_a_line_are_all_read() {
+    let rows = "[0, 0.3, 0, pi/2], [0, 0, 0.4, 0],\n [0, 0.1, 0, 0], [0, 0, 0.2, 0]";
+    for text in [format!("dh = [\n {rows}\n]\nprint(dh[0][1], [1])\n"), format!("dh = np.array([{rows}])\n")] {
+        let found = table(&text).unwrap().unwrap();
+        let lengths: Vec<&str> =
+            found.rows.iter().map(|(_, row)| if &row[1] == "0" { &row[2] } else { &row[1] }).collect();
+        assert_eq!(lengths, ["0.3", "0.4", "0.1", "0.2"], "{text}");
+    }
+    // One of them among rows that have their own lines, and a row that is none.
+    let mixed = "dh = [\n [0, 0.3, 0, 0],\n [0, 0, 0.4, 0],\n [0, 0.1, 0, 0], [0, 0, 0.2, 0],\n]\n";
+    assert!(table(mixed).unwrap_err().1.contains("is no row of 4 numbers"));
+    let broken = table("dh = [\n [0, 0.3, 0, 0], [0, 0, 0.4, 0],\n [0, 0.1, 0, 0], [0, 0, L, 0]\n]\n").unwrap_err();
+    assert!(broken.0 == 3 && broken.1.contains("`L`"), "{broken:?}");
+    assert_eq!(table("plot([0, 1, 2, 3], [1, 2, 3, 4])\n"), Ok(None));
+}
