@@ -34,9 +34,10 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
     order
 }
 
-/// What was found over the pairs.
-fn happened(judged: &Judged) -> Vec<String> {
-    judged.facts.findings.iter().map(|finding| finding.action.clone()).collect()
+/// What was found over the pairs: of the board, or of what happened during the series.
+fn found(judged: &Judged, of_board: bool) -> Vec<String> {
+    let findings = judged.facts.findings.iter().filter(|finding| finding.is_of_board() == of_board);
+    findings.map(|finding| finding.action.clone()).collect()
 }
 
 /// Warnings with their reasons, but for those that stand in the table of checks.
@@ -67,7 +68,10 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     let warnings = warnings(judged);
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), page::capital(&deciding_by(judged, Evidence::short_figure)))))
-        @if !judged.facts.findings.is_empty() { p { "What happened during the series:" } (page::warnings(&happened(judged))) }
+        @for (heading, of_board) in [("What happened during the series:", false), ("What was found of the board:", true)] {
+            @let found = found(judged, of_board);
+            @if !found.is_empty() { p { (heading) } (page::warnings(&found)) }
+        }
         (ledger(judged))
         @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
         @if !warnings.is_empty() { p { "What else to know:" } }
