@@ -45,8 +45,8 @@ pub struct Calibration {
     pub inflation: f64,
     /// What is expected of cameras and board beside the pairs: before any picture, or of lenses that are known or that each camera alone told.
     pub priors: Priors,
-    /// What each camera leaves of its own pictures, the median over them, px.
-    pub alone_px: f64,
+    /// What the left and the right camera leave of their own pictures, the median over them, px.
+    pub alone_px: [f64; 2],
     /// Whether the lenses are those that each camera alone told, because something moved between the two pictures of the pairs.
     pub each_alone: bool,
     /// How many of the first or last pairs are in it although they contradict the others.
@@ -144,12 +144,14 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 /// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them.
 pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
-    let Series { problem: start, discarded, runs, missed } = series::find(&candidates, runs)?;
+    let one_pose = || candidates.one_pose();
+    let found = series::find(&candidates, runs).map_err(|error| error.of_one_pose(one_pose()))?;
+    let Series { problem: start, discarded, runs, alone_px, missed } = found;
     let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
     let missed_at_all = Some(missed).filter(|_| !by_pairs);
     let choose = |below| lens_ladder::choose(&start, missed_at_all, &corners.board, options, below);
     let (choice, solved, by_corners) =
-        solved_by(&start, choose).map_err(|e| e.without(&skipped).of_lens(options.lens))?;
+        solved_by(&start, choose).map_err(|e| e.without(&skipped).of_one_pose(one_pose()).of_lens(options.lens))?;
     let Choice { layout, scatter, scores: lens_scores, .. } = choice;
     let known = options.known.as_ref();
     let each_alone = known.is_none() && scatter.is_some();
@@ -182,7 +184,7 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
         priors,
         each_alone,
         runs,
-        alone_px: missed.alone_px,
+        alone_px,
         skipped,
         discarded: Discarded::new(&views, discarded),
         standing: Standing::default(),

@@ -140,8 +140,15 @@ pub enum Error {
     #[error("the move between pairs {} and {} is stated twice", pairs[0], pairs[1])]
     MoveTwice { pairs: [String; 2] },
     /// The views do not tell the cameras.
-    #[error("the views are too similar to tell the cameras{}{}", focal(.focal_sigma), reasons(.skipped))]
+    #[error(
+        "the views are too similar to tell the cameras{}{}{}",
+        shown(.one_pose),
+        focal(.focal_sigma),
+        reasons(.skipped)
+    )]
     Undetermined {
+        /// How many pairs there are and by how much a corner moves from one to another at most, px, where all show the board in one pose.
+        one_pose: Option<(usize, f64)>,
         /// Worst relative standard deviation of a focal length, where there is one.
         focal_sigma: Option<f64>,
         /// Pairs that were left out before: what they show may be missing now.
@@ -188,6 +195,12 @@ fn moved(list: &[(String, String)]) -> String {
     list.iter().map(|(pairs, moved)| format!("\n  {pairs}: {moved}")).collect()
 }
 
+fn shown(one_pose: &Option<(usize, f64)>) -> String {
+    one_pose.map_or(String::new(), |(pairs, px)| {
+        format!(": all {pairs} pairs show the board in one pose, no corner moves by more than {px:.1} px from one to another")
+    })
+}
+
 fn focal(sigma: &Option<f64>) -> String {
     sigma.map_or(String::new(), |s| format!(": a focal length is known to {:.0} % only", 100.0 * s))
 }
@@ -195,13 +208,25 @@ fn focal(sigma: &Option<f64>) -> String {
 impl Error {
     /// The views do not tell the cameras, and no focal length can be named.
     pub fn undetermined() -> Error {
-        Error::Undetermined { focal_sigma: None, skipped: Vec::new() }
+        Error::Undetermined { one_pose: None, focal_sigma: None, skipped: Vec::new() }
     }
 
     /// The same error, naming the pairs that were left out before where too little was left after.
     pub fn without(self, left_out: &[Skipped]) -> Error {
         match self {
-            Error::Undetermined { focal_sigma, .. } => Error::Undetermined { focal_sigma, skipped: left_out.to_vec() },
+            Error::Undetermined { one_pose, focal_sigma, .. } => {
+                Error::Undetermined { one_pose, focal_sigma, skipped: left_out.to_vec() }
+            }
+            other => other,
+        }
+    }
+
+    /// The same error, saying that all pairs show one pose where they do.
+    pub fn of_one_pose(self, shown: Option<(usize, f64)>) -> Error {
+        match self {
+            Error::Undetermined { focal_sigma, skipped, .. } => {
+                Error::Undetermined { one_pose: shown, focal_sigma: focal_sigma.filter(|_| shown.is_none()), skipped }
+            }
             other => other,
         }
     }
@@ -209,11 +234,10 @@ impl Error {
     /// The same error, of a rich lens that was asked for: it is the lens then, not the views.
     pub fn of_lens(self, asked: Option<Lens>) -> Error {
         match (self, asked) {
-            (Error::Undetermined { focal_sigma: None, .. } | Error::NotConverged { .. }, Some(lens))
-                if lens > Lens::Brown5 =>
-            {
-                Error::LensUndetermined { lens: lens.name() }
-            }
+            (
+                Error::Undetermined { one_pose: None, focal_sigma: None, .. } | Error::NotConverged { .. },
+                Some(lens),
+            ) if lens > Lens::Brown5 => Error::LensUndetermined { lens: lens.name() },
             (other, _) => other,
         }
     }

@@ -23,12 +23,14 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
         (stdout(&output), page)
     };
     let (said, page) = page_of("checker:20x20:10", "as-it-is");
-    assert!(!said.contains("during the series") && !page.contains("What happened during the series"), "{said}");
+    let headings = ["What happened during the series", "What was found of the board"];
+    assert!(!said.contains("during the series") && headings.iter().all(|heading| !page.contains(heading)), "{said}");
     for (side, ratio) in [("10x9.94", "not 1.0060 times"), ("10x9.8", "not 1.0204 times")] {
         let (said, page) = page_of(&format!("checker:20x20:{side}"), side);
         assert!(said.contains("1.0000 times as wide as high") && said.contains(ratio), "{said}");
         let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{side}: no `{text}`"));
-        assert!(at("What happened during the series") < at("Checks that are not passed"));
+        assert!(at(headings[1]) < at("Checks that are not passed") && !page.contains(headings[0]), "{side}");
+        assert!(page[at("What to do next")..].contains("measure the board along and across"), "{side}");
         // The board is as good as it was, and nothing of it is in the rig.
         assert!(
             !page.contains("places on the board scatter") && !page.contains("included in the uncertainty"),

@@ -33,6 +33,12 @@ pub fn worst_first(judged: &Judged) -> Vec<usize> {
     order
 }
 
+/// What was found over the pairs: of the board, or of what happened during the series.
+fn found(judged: &Judged, of_board: bool) -> Vec<String> {
+    let findings = judged.facts.findings.iter().filter(|finding| finding.is_of_board() == of_board);
+    findings.map(|finding| finding.action.clone()).collect()
+}
+
 /// Warnings with their reasons, but for those that stand in the table of checks.
 fn warnings(judged: &Judged) -> Vec<String> {
     let is_new = |warning: &&Warning| judged.evidence.iter().all(|line| line.detail != warning.reason);
@@ -59,10 +65,12 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     };
     let next: Vec<String> = summary::next(judged).into_iter().map(on_this_page).collect();
     let warnings = warnings(judged);
-    let happened: Vec<&String> = judged.facts.findings.iter().map(|finding| &finding.action).collect();
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), capital(&deciding_by(judged, Evidence::short_figure)))))
-        @if !happened.is_empty() { p { "What happened during the series:" } (page::warnings(&happened)) }
+        @for (heading, of_board) in [("What happened during the series:", false), ("What was found of the board:", true)] {
+            @let found = found(judged, of_board);
+            @if !found.is_empty() { p { (heading) } (page::warnings(&found)) }
+        }
         (ledger(judged))
         @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
         @if !warnings.is_empty() { p { "What else to know:" } }

@@ -41,7 +41,11 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     lines.extend(lenses(calibration));
     lines.extend(scale(judged));
     lines.extend(second_board(judged));
-    lines.extend(judged.facts.findings.iter().map(|finding| format!("during the series: {}", finding.action)));
+    let found = |finding: &Finding| match finding.is_of_board() {
+        true => format!("found over all pairs: {}", finding.action),
+        false => format!("during the series: {}", finding.action),
+    };
+    lines.extend(judged.facts.findings.iter().map(found));
     lines.extend(pairs(calibration));
     lines.push(rig(calibration, judged));
     lines.push(board(calibration, judged));
@@ -156,9 +160,12 @@ fn pairs(calibration: &Calibration) -> Vec<String> {
     lines.extend(groups.iter().take(MOST).map(|(.., pairs)| {
         let reason = &pairs[0].reason;
         let alike = pairs.iter().all(|pair| pair.reason == *reason);
-        let of = if alike { String::new() } else { format!("of {}: ", pairs[0].pair) };
         let names: Vec<String> = pairs.iter().map(|pair| pair.pair.clone()).collect();
-        format!("  without {}: {of}{reason}", named(&names))
+        match alike {
+            true => format!("  without {}: {reason}", named(&names)),
+            // The figures are the first one's.
+            false => format!("  without {}, likewise {}: {reason}", names[0], named(&names[1..])),
+        }
     }));
     if others > 0 {
         lines.push(format!("  without {others} more, see the report"));

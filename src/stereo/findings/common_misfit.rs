@@ -2,27 +2,34 @@
 //!
 //! In: a calibration from all pairs, and what changed over them. Out: the cause that they share: a board whose squares are not as wide and high as
 //! was said, or else, where they miss their rig by several times what each camera leaves of its own pictures, pictures that were
-//! not taken at one moment. Method: one camera alone takes up much of a board that is too wide in the place that it gives it, two cameras
+//! not taken at one moment; where they miss it by less, only if a place of the right camera for each pair takes away half of the misfit, which goes neither
+//! with where the board stood, as what a lens or a board lacks does, nor with a focus. Method: one camera alone takes up much of a board that is too wide in the place that it gives it, two cameras
 //! cannot; the ratio of width and height that the pairs ask for is looked for, all poses and the rig solved again, and it is the cause where the
 //! misfit goes with it. The size of the squares itself no pictures tell. Goes wrong: both at once are told as the one that explains more.
 
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
+use super::hypothesis::{any_place, refocused};
+use super::series::{Linear, PLACES_FROM};
 use super::{Along, Finding, Kind};
 use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Lens;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::{View, in_use};
-use crate::stereo::init::board_pose::misfit_px;
+use crate::stereo::init::board_pose::{as_one_board, as_two_boards, misfit_px, times_alone};
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::{Cause, Missed, TIMES};
+use crate::stereo::select::pair_motion;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem};
 
 /// Pairs that are named as the worst.
 const WORST: usize = 5;
+
+/// How many times what corners scatter by pairs miss their rig by at least where something moved between their pictures.
+const BESIDE_CORNERS: f64 = 2.0;
 
 /// Change of the board's ratio of width and height by which the equations are asked what it would gain: far below what moves a corner by a pixel.
 const SMALL: f64 = 1e-4;
@@ -48,34 +55,77 @@ pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
     // As the refinement states it; zero where it gave none.
     let corner_sigma_px = median(in_use(&calibration.views).map(|o| (0.5 * o.covariance_px2.trace()).sqrt()));
     let corner_sigma_px = corner_sigma_px.unwrap_or(0.0);
-    let missed = Missed { alone_px: calibration.alone_px, paired_px: misfit.usual_px };
-    let is_late = misfit.usual_px >= TIMES * corner_sigma_px && missed.is_of_two_moments();
+    let is_of_two_moments = misfit.usual_px >= TIMES * corner_sigma_px && misfit.missed.is_of_two_moments();
+    let is_late = is_of_two_moments
+        || changes.is_empty()
+            && misfit.usual_px >= BESIDE_CORNERS * corner_sigma_px
+            && each_moved(calibration, &misfit);
     other_sides(calibration, &misfit, corner_sigma_px, if is_late { BESIDE_LATE } else { 1.0 })
-        .or_else(|| is_late.then(|| not_simultaneous(calibration.alone_px, misfit)))
+        .or_else(|| is_late.then(|| not_simultaneous(calibration, misfit)))
+}
+
+/// Whether something that moved between the two pictures of each pair is why these miss their rig by more than each camera misses its own pictures, and
+/// nothing else explains it. Too few pairs do not tell.
+fn each_moved(calibration: &Calibration, misfit: &Misfit) -> bool {
+    let (views, shared) = (&calibration.views, &calibration.values.shared);
+    let apart = |view: &View| times_alone(shared, view, calibration.alone_px, as_two_boards);
+    let with_own = || median(views.par_iter().filter_map(apart).collect::<Vec<f64>>());
+    // With a place of the right camera for each pair it is missed by no more than each camera misses its own pictures.
+    let explains = |own: f64| Missed { times: misfit.missed.times / own.max(1.0) }.is_better_alone();
+    views.len() >= PLACES_FROM && with_own().is_some_and(explains) && is_of_each_pair(calibration).unwrap_or(false)
+}
+
+/// Whether what takes the right camera elsewhere is each pair's own.
+fn is_of_each_pair(calibration: &Calibration) -> Option<bool> {
+    /// Share of the pairs' own changes that another cause takes away where it may be the cause.
+    const BY_PLACE: f64 = 0.25;
+    const BY_FOCUS: f64 = 0.5;
+    let (problem, layout, rig) = (calibration.problem(), &calibration.layout, calibration.rig());
+    let linear = Linear::new(&problem, layout)?;
+    let anywhere = any_place(layout);
+    let gain = |places| linear.gain_of_each(&anywhere, places);
+    let (all, beside_places) = (gain(false)?, gain(true)?);
+    let focus = Side::BOTH.map(|side| refocused(layout, rig, &[side], 0.01));
+    let by_focus = linear.gain_of_each(&focus, false)? * focus.len() as f64 / (all * anywhere.len() as f64);
+    Some(beside_places > (1.0 - BY_PLACE) * all && by_focus < BY_FOCUS)
 }
 
 /// How far pairs miss their common rig.
 struct Misfit {
     /// Median over the pairs, px.
     usual_px: f64,
+    /// The same beside what each camera leaves.
+    missed: Missed,
     /// The pairs, the worst first.
     worst_first: Vec<String>,
 }
 
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
-fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
+fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
+    let equations = calibration.problem().equations(&calibration.layout);
+    let variances = equations.and_then(|all| pair_motion::of_pairs(&all, &calibration.layout, calibration.inflation));
+    let size =
+        variances.map(|[v, _]| [v.fixed_rows::<3>(3).sum().sqrt(), v.fixed_rows::<3>(0).sum().sqrt().to_degrees()]);
+    let otherwise = size.map_or(String::new(), |[mm, deg]| {
+        format!(
+            "the board (or a camera) moved between the two, so that from pair to pair the cameras seem to stand otherwise by {mm:.2} mm and \
+             {deg:.2} deg; "
+        )
+    });
+    let [left_px, right_px] = calibration.alone_px;
     Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
-        size: Some(misfit.usual_px),
-        unit: "px",
+        size: Some(size.map_or(misfit.usual_px, |[mm, _]| mm)),
+        unit: if size.is_some() { "mm" } else { "px" },
         action: format!(
-            "the pictures of the pairs were not taken at one moment: half of the pairs miss the rig by {:.2} px and more, each camera alone \
-             by {alone_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
+            "the pictures of the pairs were not taken at one moment: {otherwise}half of the pairs miss the rig by {:.2} px and more, the left camera alone \
+             its pictures by {left_px:.2} px and the right one by {right_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
             misfit.usual_px,
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
         pairs: misfit.worst_first,
+        remedy: Some("trigger both cameras at once, or put the board on a stand for each pair".to_owned()),
         ..Finding::default()
     }
 }
@@ -83,15 +133,18 @@ fn not_simultaneous(alone_px: f64, misfit: Misfit) -> Finding {
 /// How far the pairs miss the rig, each its own along a change where there is one.
 fn misfit_without(calibration: &Calibration, change: Option<Along>) -> Misfit {
     let (layout, views, shared) = (&calibration.layout, &calibration.views, &calibration.values.shared);
-    let of = |i: usize| match &change {
-        Some(along) => left_px(&layout.step(shared, along.to(along.by_pair[i]).as_slice()), &views[i]),
-        None => left_px(shared, &views[i]),
+    let of = |i: usize| {
+        let moved = change.as_ref().map(|along| layout.step(shared, along.to(along.by_pair[i]).as_slice()));
+        let shared = moved.as_ref().unwrap_or(shared);
+        let times = times_alone(shared, &views[i], calibration.alone_px, as_one_board);
+        (left_px(shared, &views[i]), times.unwrap_or(f64::INFINITY))
     };
-    let px: Vec<f64> = (0..views.len()).into_par_iter().map(of).collect();
+    let (px, times): (Vec<f64>, Vec<f64>) = (0..views.len()).into_par_iter().map(of).unzip();
     let mut worst: Vec<usize> = (0..px.len()).collect();
     worst.sort_by(|a, b| px[*b].total_cmp(&px[*a]).then(a.cmp(b)));
     Misfit {
         usual_px: median(px.iter().copied()).unwrap_or(0.0),
+        missed: Missed { times: median(times).unwrap_or(0.0) },
         worst_first: worst.into_iter().map(|i| views[i].pair.clone()).collect(),
     }
 }
@@ -140,6 +193,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64,
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),
+        remedy: Some("measure the board along and across, and give `--measured-mm WxH`".to_owned()),
         ..Finding::default()
     })
 }

@@ -9,6 +9,7 @@
 pub mod common_misfit;
 pub mod hypothesis;
 mod one_side;
+mod other_rig;
 mod rolling_shutter;
 pub mod series;
 pub mod standing;
@@ -80,6 +81,13 @@ pub struct Finding {
     pub remedy: Option<String>,
 }
 
+impl Finding {
+    /// Whether it is what the board is like in all pairs, and nothing that happened over them.
+    pub fn is_of_board(&self) -> bool {
+        self.cause == Cause::OtherBoard.word() && self.kind == Kind::Step && self.along.is_none()
+    }
+}
+
 /// How the shared numbers change over the pairs, in the layout's order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Along {
@@ -138,14 +146,15 @@ pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<F
     })
 }
 
-/// What happened to single pairs that are not used, a finding a cause; pairs without a board or shown twice are none.
+/// What happened to single pairs that are not used, a finding for each cause or causes that are not told apart; pairs without a board or shown twice are none.
 pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     let mut found: Vec<Finding> = Vec::new();
     for pair in discarded.iter().filter(|pair| pair.cause.contradicts()) {
-        match found.iter_mut().find(|finding| finding.cause == pair.cause.word()) {
+        let cause = pair.causes();
+        match found.iter_mut().find(|finding| finding.cause == cause) {
             Some(finding) => finding.pairs.push(pair.pair.clone()),
             None => found.push(Finding {
-                cause: pair.cause.word().to_owned(),
+                cause,
                 kind: Kind::Pair,
                 pairs: vec![pair.pair.clone()],
                 action: pair.reason.clone(),

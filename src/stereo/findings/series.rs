@@ -8,13 +8,14 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::statistics::median;
 use crate::stereo::model::Layout;
 use crate::stereo::solve::Problem;
 use crate::stereo::solve::normal_equations::Block;
 use crate::stereo::solve::uncertainty::invert;
 
 /// Fewest pairs for which the board's place is a nuisance: three numbers more must leave some for the scatter.
-const PLACES_FROM: usize = 12;
+pub const PLACES_FROM: usize = 12;
 
 /// A change and what it explains.
 #[derive(Debug, Clone, PartialEq)]
@@ -138,6 +139,40 @@ impl Linear {
         let common = moved.iter().zip(amounts.iter()).fold(zero(), |sum, (m, a)| sum + m * *a);
         let scatter = self.scatter(directions, pattern, &common, &amounts);
         (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, common, gain, scatter })
+    }
+
+    /// By how much chi-squared falls where each pair has a change of its own along these directions, a number of freedom; with `places` beside what goes
+    /// with where the board stood, which then is no pair's own. Pairs far off count like those that are usual. `None` where the pairs do not determine it.
+    pub fn gain_of_each(&self, directions: &[DVector<f64>], places: bool) -> Option<f64> {
+        /// Pairs whose change gains so many times what changes usually do are far off.
+        const FAR: f64 = 9.0;
+        let along = DMatrix::from_columns(directions);
+        let own = self.matrices.iter().zip(&self.gradients);
+        let own: Vec<_> = own.map(|(m, g)| (along.tr_mul(&(m * &along)), -along.tr_mul(g))).collect();
+        let gain = |(m, g): &(DMatrix<f64>, DVector<f64>)| Some((invert(m)? * g).dot(g));
+        let gains = own.iter().map(gain).collect::<Option<Vec<f64>>>()?;
+        let most = FAR * median(gains.iter().copied())?;
+        let (n, size) = (own.len(), directions.len());
+        // A pattern a column: what all have in common, and the board's place.
+        let pattern = |i: usize| [1.0, self.places[i][0], self.places[i][1], self.places[i][2]];
+        let columns = if places { 4 } else { 1 };
+        let (mut matrix, mut right) = (DMatrix::zeros(columns * size, columns * size), DVector::zeros(columns * size));
+        let mut sum = 0.0;
+        for (i, ((m, g), gain)) in own.iter().zip(&gains).enumerate() {
+            let (weight, x) = ((most / gain).min(1.0), pattern(i));
+            sum += weight * gain;
+            for a in 0..columns {
+                let mut rows = right.rows_mut(a * size, size);
+                rows += g * (weight * x[a]);
+                for b in 0..columns {
+                    let mut block = matrix.view_mut((a * size, b * size), (size, size));
+                    block += m * (weight * x[a] * x[b]);
+                }
+            }
+        }
+        let shared = (invert(&matrix)? * &right).dot(&right);
+        let freedom = n.checked_sub(columns).filter(|left| *left > 0)? * size;
+        Some((sum - shared) / freedom as f64)
     }
 
     /// The pairs' scatter along these directions with the change taken out.

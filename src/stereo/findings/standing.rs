@@ -11,7 +11,9 @@ use nalgebra::DVector;
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
-use crate::stereo::findings::{self, Finding, Kind, common_misfit, hold, one_side, rolling_shutter, without_drift};
+use crate::stereo::findings::{
+    self, Finding, Kind, common_misfit, hold, one_side, other_rig, rolling_shutter, without_drift,
+};
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
 use crate::stereo::select::options::Options;
@@ -101,23 +103,19 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
 /// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it was found.
 fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
     let mut found = calibrate(corners, &asked.options)?;
-    let names = |pairs: &mut dyn Iterator<Item = &PairCorners>| -> Vec<String> {
-        pairs.take_while(|pair| is_of_another_rig(&found, pair)).map(|pair| pair.pair.clone()).collect()
-    };
-    let first = names(&mut corners.pairs.iter());
-    let mut last = names(&mut corners.pairs.iter().rev());
-    last.reverse();
-    if last.len() >= fewest_pairs(asked.options.known.as_ref())
+    let first = first_run(&found, corners, told.as_ref());
+    let last = last_run(&found, corners, asked, told.as_ref());
+    if let Some(last) = &last
+        && last.len() >= fewest_pairs(asked.options.known.as_ref())
         && let Some(kept) = since(corners, &last[0])
         && let Ok(calibration) = calibrate(&kept, &asked.options)
     {
-        let change = another_rig(told, last);
+        let change = another_rig(told, last.clone());
         return Ok(stands_since(corners, asked, Later { corners: kept, calibration, change: None }, change));
     }
-    let run = if last.len() >= 2 { last } else { first };
+    let at_end = last.is_some();
     let mut findings = Vec::new();
-    if run.len() >= 2 {
-        let at_end = corners.pairs.last().is_some_and(|pair| run.contains(&pair.pair));
+    if let Some(run) = last.or(first) {
         let pairs = if at_end { run.clone() } else { found.pair_names() };
         let change = another_rig(told, pairs);
         for discarded in found.discarded.pairs.iter_mut().filter(|d| run.contains(&d.pair)) {
@@ -136,9 +134,37 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     Ok((found, findings))
 }
 
+/// The first pairs, two or more, where they contradict the others and are of one other rig; `told` is a step that was found.
+fn first_run(found: &Calibration, corners: &Corners, told: Option<&Finding>) -> Option<Vec<String>> {
+    let before: Vec<&PairCorners> = corners.pairs.iter().take_while(|pair| is_of_another_rig(found, pair)).collect();
+    let is_step = told.is_some_and(|told| told.is_step_to(&found.pair_names()));
+    let mut runs = (2..=before.len()).rev().map(|count| &before[..count]);
+    runs.find(|run| is_step || other_rig::is_one(found, found.rig(), run)).map(names)
+}
+
+/// The same of the last pairs; where they are enough, the lenses may be others as well.
+fn last_run(found: &Calibration, corners: &Corners, asked: &Asked, told: Option<&Finding>) -> Option<Vec<String>> {
+    let others = corners.pairs.iter().rev().take_while(|pair| is_of_another_rig(found, pair)).count();
+    let after: Vec<&PairCorners> = corners.pairs[corners.pairs.len() - others..].iter().collect();
+    let with_lenses = |run: &[&PairCorners]| {
+        let kept = Corners { pairs: run.iter().copied().cloned().collect(), ..corners.clone() };
+        calibrate(&kept, &asked.options).is_ok_and(|own| other_rig::is_one(found, own.rig(), run))
+    };
+    let is_one = |run: &&[&PairCorners]| {
+        told.is_some_and(|told| told.is_step_to(&names(run)))
+            || other_rig::is_one(found, found.rig(), run)
+            || run.len() >= fewest_pairs(asked.options.known.as_ref()) && with_lenses(run)
+    };
+    (2..=after.len()).rev().map(|count| &after[after.len() - count..]).find(is_one).map(names)
+}
+
+fn names(pairs: &[&PairCorners]) -> Vec<String> {
+    pairs.iter().map(|pair| pair.pair.clone()).collect()
+}
+
 /// The step to these pairs, as it was found, or as far as it is known: a rig that fits so badly to the other that none fits both.
 fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
-    told.filter(|told| told.kind == Kind::Step && told.pairs == pairs).unwrap_or_else(|| {
+    told.filter(|told| told.is_step_to(&pairs)).unwrap_or_else(|| {
         let first = pairs.first().map_or("", String::as_str);
         let action = format!(
             "a camera moved or was focused: from pair {first} on the pairs are of another rig than those before. Clamp both cameras"
@@ -190,6 +216,11 @@ fn change(calibration: &Calibration, asked: &Asked) -> Option<Finding> {
 }
 
 impl Finding {
+    /// Whether it is a step, and these are the pairs from it on.
+    fn is_step_to(&self, pairs: &[String]) -> bool {
+        self.kind == Kind::Step && self.pairs == pairs
+    }
+
     /// Whether this cause is the one found, or not told apart from it.
     fn may_be(&self, cause: Cause) -> bool {
         self.cause.split('|').any(|word| word == cause.word())

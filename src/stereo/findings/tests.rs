@@ -200,7 +200,9 @@ fn a_last_pair_with_another_baseline_or_board_leaves_the_rig_unconfirmed() {
             after.rig.right_from_left.translation.vector *= 1.001;
         });
         let (found, _) = standing(&corners);
-        assert_eq!(causes(&found), [("11", Cause::OtherBoard)], "{:?}", found.skipped);
+        let [pair] = &found.discarded.pairs[..] else { panic!("{:?}", found.skipped) };
+        let causes = pair.causes();
+        assert_eq!((pair.pair.as_str(), causes.as_str()), ("11", "not-simultaneous|other-board|baseline"));
         assert!(found.skipped[0].reason.contains("or the baseline was"), "{:?}", found.skipped);
         assert_eq!(found.standing.unconfirmed, ["11"]);
     }

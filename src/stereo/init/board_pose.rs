@@ -3,6 +3,8 @@
 //! In: a rig and the corners of a pair. Out: `left_from_board`. Method: start from each picture's homography of undistorted rays,
 //! then a bundle of the pose alone over both pictures; the better end wins. Goes wrong: too few corners, corners on a line.
 
+use nalgebra::Matrix2;
+
 use crate::geometry::Transform;
 use crate::imaging::Side;
 use crate::stereo::data::View;
@@ -11,6 +13,9 @@ use crate::stereo::init::homography::{homography, pose};
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::solve::levenberg_marquardt::{self, Search};
 use crate::stereo::solve::{Loss, Priors};
+
+/// What misses by less is exact: simulated corners without noise.
+const LEAST_PX: f64 = 1e-4;
 
 /// Fits the pose to the view's active corners, of which those far off hardly count, to about a tenth of a standard deviation. `None` where they do
 /// not determine it.
@@ -32,9 +37,42 @@ pub fn of_each_alone(shared: &Shared, view: &View) -> [Option<Transform>; 2] {
 /// board where only one does. `None` where the pair has no pose on it.
 pub fn misfit_px(shared: &Shared, view: &View) -> Option<(f64, Transform)> {
     let left_from_board = fit(shared, view)?;
+    Some((worse_px(shared, view, &[left_from_board; 2], [1.0; 2])?, left_from_board))
+}
+
+/// How many times what each camera leaves of its own pictures, `alone_px`, a pair misses a rig by: the larger of both pictures'. Cameras of unlike size
+/// leave unlike px, so that each counts in its own. `poses` are those of [`as_one_board`] or [`as_two_boards`]. `None` where it has none.
+pub fn times_alone(
+    shared: &Shared,
+    view: &View,
+    alone_px: [f64; 2],
+    poses: impl Fn(&Shared, &View) -> Option<[Transform; 2]>,
+) -> Option<f64> {
+    let unit_px = alone_px.map(|px| px.max(LEAST_PX));
+    let largest_px = unit_px[0].max(unit_px[1]);
+    let mut view = view.clone();
+    for o in &mut view.observations {
+        o.whitener = Matrix2::identity() * (largest_px / unit_px[o.side as usize]);
+    }
+    worse_px(shared, &view, &poses(shared, &view)?, unit_px)
+}
+
+/// The pose of the board for the left and the right picture of a pair of which both show one board.
+pub fn as_one_board(shared: &Shared, view: &View) -> Option<[Transform; 2]> {
+    Some([fit(shared, view)?; 2])
+}
+
+/// The same where something moved between the two pictures, so that each has its own.
+pub fn as_two_boards(shared: &Shared, view: &View) -> Option<[Transform; 2]> {
+    let [left, right] = of_each_alone(shared, view);
+    Some([left.or(right)?, right.or(left)?])
+}
+
+/// The larger of both pictures' median residuals in these units, px, with a pose of the board for each.
+fn worse_px(shared: &Shared, view: &View, poses: &[Transform; 2], unit_px: [f64; 2]) -> Option<f64> {
     let sides = Side::BOTH.into_iter().filter(|side| view.active(*side).next().is_some());
-    let px = sides.map(|side| median_px(shared, &left_from_board, view, side)).collect::<Option<Vec<f64>>>()?;
-    Some((px.into_iter().reduce(f64::max)?, left_from_board))
+    let of = |side: Side| Some(median_px(shared, &poses[side as usize], view, side)? / unit_px[side as usize]);
+    sides.map(of).collect::<Option<Vec<f64>>>()?.into_iter().reduce(f64::max)
 }
 
 /// Whether a pair misses a rig by no more than a limit.

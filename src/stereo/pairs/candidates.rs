@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
-use crate::stereo::data::View;
+use crate::stereo::data::{Observation, View};
 use crate::stereo::error::{Error, ONE_PICTURE};
 use crate::stereo::init::homography::{self, FEWEST_CORNERS};
 use crate::stereo::init::single_camera::{self, OneCamera};
@@ -81,6 +81,24 @@ impl Candidates {
             discarded,
             fewest_pairs,
         })
+    }
+}
+
+impl Candidates {
+    /// The number of pairs and the most that a corner moves from one to another, px, where they all show the board in one pose: by a small part of what
+    /// a board must move over the pictures that are to tell the cameras.
+    pub fn one_pose(&self) -> Option<(usize, f64)> {
+        /// Of a picture's width.
+        const HARDLY: f64 = 0.005;
+        let first = self.views.first()?;
+        let of = |o: &Observation, view: &View| {
+            let same = |other: &&Observation| (other.side, other.col, other.row) == (o.side, o.col, o.row);
+            view.observations.iter().find(same).map_or(f64::INFINITY, |other| (other.px - o.px).norm())
+        };
+        let moves = self.views[1..].iter().flat_map(|view| first.observations.iter().map(|o| of(o, view)));
+        // From the first to either of two others.
+        let px = 2.0 * moves.fold(0.0, f64::max);
+        (px <= HARDLY * f64::from(self.width_px)).then_some((self.views.len(), px))
     }
 }
 

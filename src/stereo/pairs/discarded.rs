@@ -108,13 +108,21 @@ impl Cause {
 pub struct DiscardedPair {
     pub pair: String,
     pub cause: Cause,
+    /// Causes that explain it as well and are less common.
+    #[serde(skip)]
+    pub or: &'static [Cause],
     /// The same for a person, with figures.
     pub reason: String,
 }
 
 impl DiscardedPair {
     pub fn new(pair: &str, cause: Cause, reason: String) -> DiscardedPair {
-        DiscardedPair { pair: pair.to_owned(), cause, reason }
+        DiscardedPair { pair: pair.to_owned(), cause, or: &[], reason }
+    }
+
+    /// Its cause, or the causes that are not told apart, with `|` between them.
+    pub fn causes(&self) -> String {
+        Cause::words(std::iter::once(self.cause).chain(self.or.iter().copied()))
     }
 
     /// Without the cause.

@@ -31,23 +31,20 @@ pub const TIMES: f64 = 3.0;
 /// one camera.
 const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
 
-/// How far pictures are usually missed, px.
+/// How many times what each camera leaves of its own pictures the pairs usually miss their rig by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Missed {
-    /// By each camera alone, the median over its own pictures.
-    pub alone_px: f64,
-    /// By the rig of all pairs, the median over them.
-    pub paired_px: f64,
+    pub times: f64,
 }
 
 impl Missed {
     /// Whether the two pictures of the pairs were usually not taken at one moment.
     pub fn is_of_two_moments(&self) -> bool {
-        self.paired_px > TIMES * self.alone_px
+        self.times > TIMES
     }
 
     /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
     pub fn is_better_alone(&self) -> bool {
-        self.paired_px > HALF_IS_LOST * self.alone_px
+        self.times > HALF_IS_LOST
     }
 }

@@ -3,19 +3,18 @@
 //! In: a series with its rig, and those pairs. Out: a cause a pair, with figures. Method: a board whose squares are larger by a share is taken for
 //! nearer by each camera along its own rays: the two places that the cameras give it are apart along the baseline, by that share of
 //! it. One number explains such a pair; a board or a camera that moved between the two pictures takes six. A board that moved along the
-//! baseline looks the same, so that what the other pairs did decides: where others show the same other size it is a board, where others
-//! moved, and fewer than three show one size, this one did. Goes wrong: several boards of one other size that all moved alike.
+//! baseline looks the same, and a baseline that changed: all are told, what is commonest first, that the board moved; where others show the same
+//! other size, and, where others moved, three do, that it is a board. Goes wrong: several boards of one other size that all moved alike.
 
 use nalgebra::Vector3;
 
 use crate::geometry::rotation_vector;
-use crate::statistics::median;
 use crate::stereo::data::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::model::Shared;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;
-use crate::stereo::pairs::{Cause, Missed};
+use crate::stereo::pairs::{Cause, DiscardedPair, Missed};
 
 /// Shares that differ by no more than this part of them are of one board.
 const ONE_SIZE: f64 = 0.1;
@@ -32,17 +31,17 @@ struct Apart {
     larger: Option<f64>,
 }
 
-/// What happened to each of these pairs; with each comes by how much it misses the rig, px, where it has a pose on it.
-pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) -> Vec<(Cause, String)> {
+/// What happened to each of these pairs; with each comes by how much it misses the rig, px, where it has a pose on it. `missed` is how far the pairs miss
+/// it usually.
+pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64, missed: Missed) -> Vec<DiscardedPair> {
     let apart: Vec<Option<Apart>> = strays.iter().map(|&(i, px)| apart(series, i, px)).collect();
-    let alone = series.alone_px.iter().flat_map(|side| side.iter().flatten().copied());
-    let others_moved = median(alone)
-        .is_some_and(|alone_px| Missed { alone_px, paired_px: usual_px }.is_of_two_moments())
-        || apart.iter().flatten().any(|apart| apart.larger.is_none());
+    let others_moved = missed.is_of_two_moments() || apart.iter().flatten().any(|apart| apart.larger.is_none());
     let baseline_mm = series.shared.rig.baseline_mm();
-    let explained = |(k, &(_, missed_px)): (usize, &(usize, Option<f64>))| {
+    let explained = |(k, &(i, missed_px)): (usize, &(usize, Option<f64>))| {
+        let pair = series.views[i].pair.as_str();
         let Some(Apart { way_mm, turned_rad, larger }) = &apart[k] else {
-            return (Cause::Unknown, "its corners form no board on one of the cameras".to_owned());
+            let reason = "its corners form no board on one of the cameras".to_owned();
+            return DiscardedPair::new(pair, Cause::Unknown, reason);
         };
         let missed = missed_px.map_or(String::new(), |px| {
             format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
@@ -52,36 +51,33 @@ pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64) 
         };
         let again = apart.iter().enumerate().filter(|(other, a)| *other != k && a.as_ref().is_some_and(same)).count();
         let shown_again = again >= if others_moved { ENOUGH_OF_MOVED } else { 1 };
-        let (way, or_board) = match larger {
-            Some(share) if shown_again || !others_moved => {
-                return (Cause::OtherBoard, other_board(*share, baseline_mm, shown_again) + &missed);
+        let (or, way, or_board): (&'static [Cause], String, String) = match larger {
+            Some(share) if shown_again => {
+                let reason = format!("it shows {}{missed}", other_board(*share, baseline_mm));
+                return DiscardedPair { or: &[Cause::Baseline], ..DiscardedPair::new(pair, Cause::OtherBoard, reason) };
             }
             Some(share) => (
-                format!("{:.1} mm along the line between the cameras", share.abs() * baseline_mm),
-                format!("; or it shows another board, its squares {}", size(*share)),
+                &[Cause::OtherBoard, Cause::Baseline],
+                format!("{:.2} mm along the line between the cameras", share.abs() * baseline_mm),
+                format!("; or it shows {}", other_board(*share, baseline_mm)),
             ),
-            None => (format!("{:.1} mm and {:.1} deg", way_mm.norm(), turned_rad.to_degrees()), String::new()),
+            None => (&[], format!("{:.1} mm and {:.1} deg", way_mm.norm(), turned_rad.to_degrees()), String::new()),
         };
         let reason = format!(
             "its pictures were not taken at one moment: between them the board (or a camera) moved by about {way}{missed}{or_board}. Clamp \
              the board and trigger both cameras at once"
         );
-        (Cause::NotSimultaneous, reason)
+        DiscardedPair { or, ..DiscardedPair::new(pair, Cause::NotSimultaneous, reason) }
     };
     strays.iter().enumerate().map(explained).collect()
 }
 
-fn size(share: f64) -> String {
-    format!("{:.2} % {}", 100.0 * share.abs(), if share > 0.0 { "larger" } else { "smaller" })
-}
-
-/// A pair with other squares; one that is the only one of its size may have moved instead.
-fn other_board(share: f64, baseline_mm: f64, shown_again: bool) -> String {
-    let length = if share > 0.0 { "shorter" } else { "longer" };
-    let moved = if shown_again { "" } else { ", or the board moved by so much along it between the two pictures" };
+/// A board with other squares, and what no picture tells from it.
+fn other_board(share: f64, baseline_mm: f64) -> String {
+    let (size, length) = if share > 0.0 { ("larger", "shorter") } else { ("smaller", "longer") };
     format!(
-        "it shows another board, its squares {} than those in the other pairs, or the baseline was {:.2} mm {length}{moved}",
-        size(share),
+        "another board, its squares {:.2} % {size} than those in the other pairs, or the baseline was {:.2} mm {length}",
+        100.0 * share.abs(),
         share.abs() * baseline_mm
     )
 }
@@ -172,8 +168,12 @@ mod tests {
         let world = World::new(14, 7);
         let mut corners = world.corners(7);
         pushed(&world, &mut corners, 7, &[(4, 6.0)]);
-        let [(pair, cause, reason)] = &said(&corners)[..] else { panic!("{:?}", said(&corners)) };
-        assert!(pair == "04" && *cause == Cause::OtherBoard && reason.contains("or the board moved"), "{reason}");
+        let pairs = calibrate(&corners, &BROWN4).unwrap().discarded.pairs;
+        let [pair] = &pairs[..] else { panic!("{pairs:?}") };
+        // What is commonest first, and all that explains it.
+        assert_eq!((pair.pair.as_str(), pair.causes().as_str()), ("04", "not-simultaneous|other-board|baseline"));
+        let reason = &pair.reason;
+        assert!(reason.contains("the board (or a camera) moved") && reason.contains("or it shows another"), "{reason}");
         // Two of one size are of a board; two of two sizes may both have moved.
         pushed(&world, &mut corners, 7, &[(9, 6.0)]);
         let both = said(&corners);

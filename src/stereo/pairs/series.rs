@@ -13,7 +13,7 @@ use crate::geometry::Transform;
 use crate::imaging::{Side, Skipped};
 use crate::statistics::median;
 use crate::stereo::data::View;
-use crate::stereo::init::board_pose::misfit_px;
+use crate::stereo::init::board_pose::{as_one_board, misfit_px, times_alone};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::candidates::Candidates;
@@ -43,7 +43,9 @@ pub struct Series {
     pub discarded: Vec<DiscardedPair>,
     /// How many pairs of runs that contradict the others stayed.
     pub runs: usize,
-    /// How far the pairs and their pictures are missed.
+    /// What the left and the right camera usually leave of their own pictures, px.
+    pub alone_px: [f64; 2],
+    /// How far the pairs miss the rig beside that.
     pub missed: Missed,
 }
 
@@ -83,10 +85,14 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
     }
     let out: Vec<_> = strays.into_iter().zip(mixed_up).filter(|(i, _)| !runs_kept.contains(i)).collect();
     let open = out.iter().filter(|(_, why)| why.is_none()).map(|(i, _)| (*i, misfits[*i].map(|(px, _)| px)));
-    let mut moved = moved::explain(&series, &open.collect::<Vec<_>>(), usual_px).into_iter();
+    let alone_px = alone_px_of(candidates);
+    let times = |view: &View| times_alone(&shared, view, alone_px, as_one_board);
+    let times = median(views.par_iter().filter_map(times).collect::<Vec<f64>>());
+    let missed = Missed { times: times.unwrap_or(f64::INFINITY) };
+    let mut moved = moved::explain(&series, &open.collect::<Vec<_>>(), usual_px, missed).into_iter();
     let discard = |(i, why): (usize, Option<(Cause, String)>)| {
-        let (cause, reason) = why.or_else(|| moved.next())?;
-        Some(DiscardedPair::new(&views[i].pair, cause, reason))
+        let of = |(cause, reason)| DiscardedPair::new(&views[i].pair, cause, reason);
+        why.map(of).or_else(|| moved.next())
     };
     let discarded: Vec<DiscardedPair> = out.into_iter().filter_map(discard).collect();
     check(candidates, &misfits, usual_px, &members, &discarded)?;
@@ -95,7 +101,7 @@ pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
     let mut discarded: Vec<DiscardedPair> = discarded.into_iter().chain(candidates.discarded.iter().cloned()).collect();
     discarded.sort_by(|a, b| a.pair.cmp(&b.pair));
     let (problem, runs) = (Problem { views, values, priors }, runs_kept.len());
-    Ok(Series { problem, discarded, runs, missed: Missed { alone_px: alone_px_of(candidates), paired_px: usual_px } })
+    Ok(Series { problem, discarded, runs, alone_px, missed })
 }
 
 /// The pairs with the numbering that they agree on, and the rig in the middle of their own.
@@ -156,8 +162,8 @@ fn ends(open: &[usize], count: usize, misfits: &[Misfit]) -> Vec<usize> {
 }
 
 /// What each camera usually leaves of its own pictures, px.
-fn alone_px_of(candidates: &Candidates) -> f64 {
-    median(candidates.cameras.iter().flat_map(|camera| camera.median_px.iter().flatten().copied())).unwrap_or(0.0)
+fn alone_px_of(candidates: &Candidates) -> [f64; 2] {
+    candidates.cameras.each_ref().map(|camera| median(camera.median_px.iter().flatten().copied()).unwrap_or(0.0))
 }
 
 /// Refuses where there is no telling which pairs are right, or too few are left.
@@ -169,7 +175,7 @@ fn check(
     discarded: &[DiscardedPair],
 ) -> Result<(), Error> {
     let total = candidates.views.len();
-    let alone_px = alone_px_of(candidates);
+    let alone_px = alone_px_of(candidates).into_iter().fold(0.0, f64::max);
     let width_px = f64::from(candidates.width_px);
     let none = usual_px > SEVERAL * alone_px && usual_px > LARGEST_SHARE * width_px;
     if none || 2 * members.len() <= total {

@@ -30,14 +30,12 @@ pub fn lenses(
 ) -> Option<KnownLenses> {
     let [left, right] = [one(start, board, lens, Side::Left)?, one(start, board, lens, Side::Right)?];
     // By the lens that was chosen: what a simpler one lacks is not lost in the pairs.
-    let missed = paired.map_or(missed, |paired| Missed {
-        alone_px: (0.5 * (left.scatter_px.powi(2) + right.scatter_px.powi(2))).sqrt(),
-        paired_px: scatter_px(paired),
-    });
+    let alone_px = (0.5 * (left.scatter_px.powi(2) + right.scatter_px.powi(2))).sqrt();
+    let missed = paired.map_or(missed, |paired| Missed { times: scatter_px(paired) / alone_px });
     if !missed.is_better_alone() {
         return None;
     }
-    let once_more = (missed.alone_px / missed.paired_px).powi(2);
+    let once_more = missed.times.powi(-2);
     let layout = Layout { transform: false, ..Layout::rig(lens, false) };
     let (n, at) = (left.covariance.nrows(), layout.camera_start(Side::Right));
     let mut matrix = DMatrix::zeros(layout.count(), layout.count());

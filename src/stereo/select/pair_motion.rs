@@ -25,14 +25,8 @@ struct Told {
 /// Covariance of the shared numbers by the pairs' motions. `own` is the inverse of the normal equations, `inflation` the variance of the whitened
 /// residuals. `None` where the transform is not among the shared numbers or the pairs do not determine them.
 pub fn covariance(equations: &Equations, layout: &Layout, own: &DMatrix<f64>, inflation: f64) -> Option<DMatrix<f64>> {
-    let at = layout.transform.then(|| layout.transform_start())?;
-    let told = |block: &Block| {
-        let (matrix, gradient) = block.reduced(0.0)?;
-        Some(Told { matrix: matrix / inflation, gradient: gradient / inflation })
-    };
-    let pairs = equations.blocks.iter().map(told).collect::<Option<Vec<Told>>>()?;
-    let prior = Told { matrix: &equations.prior.matrix / inflation, gradient: &equations.prior.gradient / inflation };
-    let variances = Matrix6::from_diagonal(&variances(&pairs, &prior, at)?);
+    let (pairs, variances) = told(equations, layout, inflation)?;
+    let (at, variances) = (layout.transform_start(), Matrix6::from_diagonal(&variances));
     let own = own * inflation;
     let by_motion = pairs.iter().fold(DMatrix::zeros(own.nrows(), own.nrows()), |sum, pair| {
         let pull = pair.matrix.columns(at, 6);
@@ -41,16 +35,43 @@ pub fn covariance(equations: &Equations, layout: &Layout, own: &DMatrix<f64>, in
     Some(&own * by_motion * &own)
 }
 
+/// Variances of the six numbers from pair to pair, and those by which a pair usually tells them. `inflation` is as for [`covariance`].
+pub fn of_pairs(equations: &Equations, layout: &Layout, inflation: f64) -> Option<[Vector6<f64>; 2]> {
+    let (pairs, variances) = told(equations, layout, inflation)?;
+    Some([variances, by_noise(&pairs, layout.transform_start())])
+}
+
+/// What each pair tells, and the variances of the six numbers.
+fn told(equations: &Equations, layout: &Layout, inflation: f64) -> Option<(Vec<Told>, Vector6<f64>)> {
+    let at = layout.transform.then(|| layout.transform_start())?;
+    let told = |block: &Block| {
+        let (matrix, gradient) = block.reduced(0.0)?;
+        Some(Told { matrix: matrix / inflation, gradient: gradient / inflation })
+    };
+    let pairs = equations.blocks.iter().map(told).collect::<Option<Vec<Told>>>()?;
+    let prior = Told { matrix: &equations.prior.matrix / inflation, gradient: &equations.prior.gradient / inflation };
+    let variances = variances(&pairs, &prior, at)?;
+    Some((pairs, variances))
+}
+
+fn link(pair: &Told, at: usize) -> Matrix6<f64> {
+    pair.matrix.fixed_view::<6, 6>(at, at).into_owned()
+}
+
+/// Variances of the six numbers by the noise of a usual pair, each with the others known.
+fn by_noise(pairs: &[Told], at: usize) -> Vector6<f64> {
+    let known = pairs.iter().fold(Vector6::zeros(), |sum, pair| sum + link(pair, at).diagonal());
+    known.map(|known| pairs.len() as f64 / known)
+}
+
 /// The likeliest variances of the six numbers from pair to pair, what the shared numbers take up of the motions allowed for (restricted
 /// likelihood). The six begin with number `at` of the shared ones.
 fn variances(pairs: &[Told], prior: &Told, at: usize) -> Option<Vector6<f64>> {
     let count = pairs.len() as f64;
-    let link = |pair: &Told| pair.matrix.fixed_view::<6, 6>(at, at).into_owned();
-    let known = pairs.iter().fold(Vector6::zeros(), |sum, pair| sum + link(pair).diagonal());
-    let mut variances = known.map(|known| count / known);
+    let mut variances = by_noise(pairs, at);
     for _ in 0..ROUNDS {
         let drawn = Matrix6::from_diagonal(&variances.map(|v| 1.0 / v));
-        let spreads = pairs.iter().map(|pair| (link(pair) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
+        let spreads = pairs.iter().map(|pair| (link(pair, at) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
         let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
         for (pair, spread) in pairs.iter().zip(&spreads) {
             let through = pair.matrix.columns(at, 6) * spread;

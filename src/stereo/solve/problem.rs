@@ -164,7 +164,11 @@ impl Solved {
         let covariance = uncertainty::covariance(&equations).ok_or_else(Error::undetermined)?;
         let worst = worst_focal_sigma(&covariance, layout, &self.shared().rig);
         let known = worst <= UNTOLD_FOCAL_SIGMA;
-        if known { Ok(covariance) } else { Err(Error::Undetermined { focal_sigma: Some(worst), skipped: Vec::new() }) }
+        if known {
+            Ok(covariance)
+        } else {
+            Err(Error::Undetermined { one_pose: None, focal_sigma: Some(worst), skipped: Vec::new() })
+        }
     }
 
     /// The normal equations with the loss's own curvature: along its residual a corner's gradient changes by less than its weight.

@@ -139,7 +139,16 @@ fn boards_that_are_never_tilted_do_not_tell_the_cameras() {
     // Side by side and square to the board, so that neither camera sees it from the side.
     let refused = calibrate(&World::facing(8, |i| Vector3::z() * 0.1 * i).corners(1), &Options::default());
     let told = |c: Calibration| (c.rig().left.fx, c.covariance[(0, 0)].sqrt(), c.layout);
-    assert!(matches!(refused, Err(Error::Undetermined { .. })), "{:?}", refused.map(told));
+    assert!(matches!(refused, Err(Error::Undetermined { one_pose: None, .. })), "{:?}", refused.map(told));
+}
+
+#[test]
+fn boards_in_one_pose_are_said_to_be() {
+    let mut world = World::facing(8, |_| Vector3::zeros());
+    world.poses.iter_mut().for_each(|pose| pose.translation.vector = Vector3::new(0.0, 0.0, 550.0));
+    let refused = calibrate(&world.corners(1), &Options::default()).map(|found| found.layout);
+    let said = refused.as_ref().map_err(Error::to_string);
+    assert!(matches!(said, Err(said) if said.contains("all 8 pairs show the board in one pose")), "{refused:?}");
 }
 
 #[test]

@@ -154,7 +154,11 @@ fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     if focal_sigma > WORST_FOCAL_SIGMA
         && lenses_known.is_some_and(|covariance| baseline_mm >= FEWEST * sigma_mm(&covariance, 3))
     {
-        return Err(Error::Undetermined { focal_sigma: Some(focal_sigma), skipped: calibration.skipped.clone() });
+        return Err(Error::Undetermined {
+            one_pose: None,
+            focal_sigma: Some(focal_sigma),
+            skipped: calibration.skipped.clone(),
+        });
     }
     Err(Error::NoBaseline { baseline_mm, sigma_mm: sigma_of_both_mm })
 }
