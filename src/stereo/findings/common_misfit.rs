@@ -2,10 +2,11 @@
 //!
 //! In: a calibration from all pairs, and what changed over them. Out: the cause that they share: a board whose squares are not as wide and high as
 //! was said, or else, where they miss their rig by several times what each camera leaves of its own pictures, pictures that were
-//! not taken at one moment; where they miss it by less, only if a place of the right camera for each pair takes away half of the misfit, which goes neither
-//! with where the board stood, as what a lens or a board lacks does, nor with a focus. Method: one camera alone takes up much of a board that is too wide in the place that it gives it, two cameras
-//! cannot; the ratio of width and height that the pairs ask for is looked for, all poses and the rig solved again, and it is the cause where the
-//! misfit goes with it. The size of the squares itself no pictures tell. Goes wrong: both at once are told as the one that explains more.
+//! not taken at one moment; where they miss it by less, only if another place of the right camera for each pair takes away half of the misfit, and goes
+//! neither with where the board stood, as what a lens or a board lacks does, nor with a focus. Method: one camera alone takes up much of a
+//! board that is too wide in the place that it gives it, two cameras cannot; the ratio of width and height that the pairs ask for is looked for, all
+//! poses and the rig solved again, and it is the cause where the misfit goes with it. The size of the squares itself no pictures tell. Goes wrong:
+//! both at once are told as the one that explains more.
 
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
