@@ -129,7 +129,7 @@ impl Taken<'_> {
             }
         }
         let path = &self.parts[picked.points.first().map_or(picked.joints[0].part, |(_, at)| at[0].part)].grid.path;
-        from_table(&Table::new(path, header, rows)?)
+        from_table(Table::new(path, header, rows)?)
     }
 
     fn count(&self) -> usize {

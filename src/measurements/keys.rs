@@ -2,8 +2,9 @@
 //!
 //! In: the files of one table. Out: the same with their rows in the order of one of them, and a sentence where that is another than they stand in.
 //! A row's name is its `pose`, its number, or a label that ends in its number. Names that stand in the same order need nothing. Rows whose name the
-//! other file does not have are left out and said. What goes wrong: names of which the other file has less than half, which are said, and the rows
-//! paired as they stand; and a name that has more rows than others in a file of several readings a pose, which is refused.
+//! other file does not have are left out and said. A file of points may have more rows of one name than of another: each takes the joints of its
+//! name. What goes wrong: names of which the other file has less than half, which are said, and the rows paired as they stand; and a name that has
+//! more rows of joints than others, or one of three files and more, which is refused.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -116,11 +117,15 @@ pub(super) fn align(parts: &mut [Part]) -> Result<Option<String>> {
     }
     let sentence = sentence(parts, first, &joined, &kept);
     let count = first.names.len();
+    let mut of_first = kept.clone();
     for (key, of_name) in joined.iter().zip(&rows) {
         let of = |row: &usize| of_name.get(first.names[*row].as_str()).map_or(&[][..], Vec::as_slice);
         let times = kept.first().map_or(0, |row| of(row).len());
         if let Some(odd) = kept.iter().find(|row| of(row).len() != times) {
-            return Err(uneven(&parts[key.part], &first.names[*odd], of(odd), times));
+            if joined.len() > 1 || !is_measured_alone(&parts[key.part]) {
+                return Err(uneven(&parts[key.part], &first.names[*odd], of(odd), times));
+            }
+            of_first = kept.iter().flat_map(|row| vec![*row; of(row).len()]).collect();
         }
         let order: Vec<usize> = kept.iter().flat_map(of).copied().collect();
         reorder(&mut parts[key.part], key, &order);
@@ -129,12 +134,18 @@ pub(super) fn align(parts: &mut [Part]) -> Result<Option<String>> {
     let of_joined = |part: usize| joined.iter().any(|key| key.part == part);
     for part in (0..parts.len()).filter(|part| !of_joined(*part) && *part != first.part) {
         if parts[part].rows.len() == count {
-            parts[part].rows = kept.iter().map(|&row| parts[part].rows[row].clone()).collect();
+            parts[part].rows = of_first.iter().map(|&row| parts[part].rows[row].clone()).collect();
         }
     }
-    reorder(&mut parts[first.part], first, &kept);
+    reorder(&mut parts[first.part], first, &of_first);
     parts[first.part].key = Some(first.column);
     Ok(Some(sentence))
+}
+
+/// Whether a file has what was measured, and no joints of its own that its rows could differ in.
+fn is_measured_alone(part: &Part) -> bool {
+    part.names_any(|what| matches!(what, What::Coordinate(_) | What::Distance | What::Matrix(..)))
+        && !part.names_any(|what| matches!(what, What::Joint(_)))
 }
 
 fn reorder(part: &mut Part, key: &Key, order: &[usize]) {
@@ -177,6 +188,7 @@ fn contradiction(parts: &[Part], first: &Key, other: &Key) -> Option<String> {
 fn uneven(part: &Part, name: &str, rows: &[usize], times: usize) -> Error {
     let line = rows.first().map_or(1, |&row| part.rows[row].0);
     let message = format!("`{name}` has {} rows, others have {times}", rows.len());
-    let hint = "where files are joined by the names of their rows, each has as many rows in one file";
+    let hint = "where files are joined by the names of their rows, each has as many rows in one file; only in one of two files, that of the \
+                points, a name may have more of them than others";
     part.grid.refuse(line, message, Some(hint))
 }

@@ -6,6 +6,7 @@ mod columns;
 mod copies;
 mod given;
 mod keys;
+mod readings;
 mod rows;
 pub mod source;
 mod stuck;

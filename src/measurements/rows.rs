@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use camino::Utf8Path;
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::summaries;
+use super::{readings, summaries};
 use crate::csv_table::{Table, quoted};
 use crate::files::Result;
 
@@ -174,7 +174,8 @@ impl Table<'_> {
             }
             if let Some(first) = seen.insert((pose, of_target), line) {
                 let what = if target.is_some() { format!(" with target `{of_target}`") } else { String::new() };
-                return Err(self.refuse(line, format!("pose `{pose}`{what} stands in line {first} already")));
+                let message = format!("pose `{pose}`{what} stands in line {first} already");
+                return Err(self.refuse_with(line, message, Some(readings::ONE_NAME)));
             }
             if role == Role::Center
                 && let Some((first, center)) = centers.insert(group, (line, pose))
@@ -213,7 +214,7 @@ pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
 /// Reads `measurements.csv`, or any table with `j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`; `pose` is the row's number, `group` one and
 /// `role` sample where they are absent.
 /// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of
-/// its targets.
+/// its targets. Readings repeated under one name have it with their number behind it.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     read_whole(path).map(|(rows, _)| rows)
 }
@@ -223,11 +224,12 @@ pub(super) fn read_whole(path: &Utf8Path) -> Result<(Vec<Measurement>, Vec<Strin
     let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
     let mut table = Table::read(path, "measurements file", hint)?;
     let below = [table.without_rows_below()?, summaries::taken_away(path, &mut table.rows)?];
-    Ok((from_table(&table)?, below.into_iter().flatten().collect()))
+    Ok((from_table(table)?, below.into_iter().flatten().collect()))
 }
 
 /// Measurements from a table.
-pub(super) fn from_table(table: &Table) -> Result<Vec<Measurement>> {
+pub(super) fn from_table(mut table: Table) -> Result<Vec<Measurement>> {
+    readings::named_apart(&mut table)?;
     let named = |c: &usize| table.rows.iter().any(|(_, row)| !row[*c].is_empty());
     let target = table.column("target").filter(named);
     let poses = table.poses(target)?;

@@ -46,7 +46,7 @@ pub(in crate::measurements) fn clearest(parts: &[Part], ways: Vec<Way>, robot: &
 
 fn of_way(parts: &[Part], way: &Way, robot: &Robot) -> Option<Apart> {
     let picked = &way.picked;
-    let points: Vec<At> = picked.points.iter().flat_map(|(_, at)| *at).collect();
+    let points = picked.all_points();
     let taken = |at: &At| picked.joints.contains(at) || points.contains(at);
     let is_named = |p: &Part| p.names_any(|w| matches!(w, What::Own("group" | "target")));
     if points.is_empty() || parts.iter().any(is_named) {

@@ -46,6 +46,11 @@ impl Picked {
         self.points.first().map_or(Vec::new(), |(_, at)| at.to_vec())
     }
 
+    /// The columns of all points.
+    pub fn all_points(&self) -> Vec<At> {
+        self.points.iter().flat_map(|(_, at)| *at).collect()
+    }
+
     pub fn is_measured(&self) -> bool {
         !self.points.is_empty() || self.distance.is_some()
     }
@@ -178,7 +183,7 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         let (first, second) = (&complete[0], &complete[1]);
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
         // Nothing of the points where they are not clear.
-        let points = points(parts).ok().and_then(|sets| sets.first().map(|(_, at, _)| at.to_vec())).unwrap_or_default();
+        let points: Vec<At> = points(parts).into_iter().flatten().flat_map(|(_, at, _)| at).collect();
         let flag = |joints: &[At]| columns_flag(parts, joints, &points, None);
         let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
@@ -348,6 +353,8 @@ pub(in crate::measurements) fn columns_flag(
         groups(parts, joint_number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
     named.sort_unstable();
     let named: Vec<At> = named.into_iter().map(|(_, at)| at).collect();
+    // Of rows put side by side the first says what all are.
+    let points: Vec<At> = points.iter().copied().filter(|at| at.column < parts[at.part].width_of_file()).collect();
     let named_joints = if joints.is_empty() { named.as_slice() } else { joints };
     let mut words = Vec::new();
     for (part, file) in parts.iter().enumerate() {

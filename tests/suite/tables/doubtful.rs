@@ -283,3 +283,35 @@ fn what_is_lacking_is_said_of_all_files() {
     let (a, b) = (part("a.csv"), part("b.csv"));
     refused(&source(&[&a, &b]), &robot, &["of all files side by side (2 of a.csv, 2 of b.csv)"]);
 }
+
+#[test]
+fn flags_that_settle_which_joints_keep_all_targets() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(24);
+    let all = of_reflectors(&rows);
+    let beside = |again: fn(f64) -> f64| -> String {
+        let line = |((q, _), p): (&(Vec<f64>, [f64; 3]), &Vec<f64>)| {
+            let cells = [p.clone(), q.clone(), q.iter().copied().map(again).collect()].concat();
+            cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",") + "\n"
+        };
+        rows.iter().zip(&all).map(line).collect()
+    };
+    let points = "x1,y1,z1,x2,y2,z2,x3,y3,z3";
+    let units = ["deg", "rad"].map(|unit| (1..7).map(|j| format!(",q{j} [{unit}]")).collect::<String>()).concat();
+    let sets: [(&str, fn(f64) -> f64); 2] = [
+        (&units, f64::to_radians),
+        // Names that are not known, and none.
+        (",torso,knee,hip,neck,waist,ankle,,,,,,", |q| q + 1e-3 * (9.0 * q).sin()),
+    ];
+    for (joints, again) in sets {
+        let file = folder.file("two.csv", format!("{points}{joints}\n{}", beside(again)));
+        let flags = ["", "-,-,-,-,-,-,"].map(|skipped| format!("{points},{skipped}j1,j2,j3,j4,j5,j6"));
+        let [first, second] = flags.each_ref().map(|flag| format!("`--columns {flag}`"));
+        refused(&source(&[&file]), &robot, &["two sets of joints would do", &first, &second]);
+        for flag in flags {
+            let told = Source { columns: Some(flag), ..source(&[&file]) };
+            let (found, said) = told.read(&robot).unwrap_or_else(|e| panic!("{joints}: {}", report(&e)));
+            assert!(found.len() == 72 && said[0].contains("3 targets a pose"), "{joints}: {said:?}");
+        }
+    }
+}

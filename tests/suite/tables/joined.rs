@@ -101,10 +101,74 @@ fn several_readings_a_pose_are_joined_by_its_name() {
     let [q, p] = tables(&folder, &rows, &numbered(0..24, ""), &readings, true);
     let (found, _) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
     same(&found, &rows, "twice, and copies");
+    // Once more, to the last digit.
     shuffled.push(3);
     let uneven: Vec<(usize, String)> = numbered(shuffled.into_iter(), "");
     let [q, p] = tables(&folder, &rows, &numbered(0..24, ""), &uneven, true);
+    let (found, said) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+    same(&found, &rows, "one copy");
+    assert!(said.iter().any(|line| line.contains("1 of 25 rows are copies")), "{said:?}");
+    // One row of points cannot be at two rows of joints.
+    let [q, p] = tables(&folder, &rows, &uneven, &numbered(0..24, ""), true);
     refused(&source(&[&q, &p]), &robot, &["`4` has 2 rows, others have 1"]);
+}
+
+/// Each pose of these rows read so many times, some more often than others, a few micrometres apart; and the pose of each.
+fn repeated(rows: &Rows, times: fn(usize) -> usize) -> (Rows, Vec<(usize, String)>) {
+    let poses: Vec<usize> = (0..rows.len()).flat_map(|pose| vec![pose; times(pose)]).collect();
+    let read = |(k, &pose): (usize, &usize)| {
+        let (joints, point) = &rows[pose];
+        (joints.clone(), point.map(|v| v + 4e-3 * (v + 1.7 * k as f64).sin()))
+    };
+    let all = poses.iter().enumerate().map(read).collect();
+    (all, poses.iter().enumerate().map(|(k, pose)| (k, (pose + 1).to_string())).collect())
+}
+
+#[test]
+fn readings_repeated_under_the_name_of_a_pose_are_of_one_pose() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(24);
+    let one_table = |rows: &Rows, names: &[(usize, String)]| {
+        let line = |(k, name): &(usize, String)| {
+            let cells: Vec<String> = joined(&rows[*k].0, &rows[*k].1).iter().map(f64::to_string).collect();
+            format!("{name},{}\n", cells.join(","))
+        };
+        folder
+            .file("one.csv", "pose,j1,j2,j3,j4,j5,j6,x,y,z\n".to_owned() + &names.iter().map(line).collect::<String>())
+    };
+    let often: [fn(usize) -> usize; 2] = [|_| 3, |pose| 1 + pose % 4];
+    for times in often {
+        let (readings, names) = repeated(&rows, times);
+        let one = one_table(&readings, &names);
+        let (found, _) = source(&[&one]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+        same(&found, &readings, "one file");
+        let of_last = (0..times(23)).map(|k| format!("24.{}", k + 1)).collect::<Vec<_>>();
+        assert!(found.iter().rev().zip(of_last.iter().rev()).all(|(row, name)| row.at.pose == *name), "{of_last:?}");
+        // The joints in a file of their own, in another order: one row of them a name.
+        let q = &tables(&folder, &rows, &numbered((0..24).rev(), ""), &[], true)[0];
+        let p = &folder.file("points.csv", {
+            let point = |(k, name): &(usize, String)| {
+                let [x, y, z] = readings[*k].1;
+                format!("{name},{x},{y},{z}\n")
+            };
+            "pose,x,y,z\n".to_owned() + &names.iter().map(point).collect::<String>()
+        });
+        let (mut found, _) = source(&[q, p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+        let number = |row: &Measurement| row.at.pose.split('.').next().and_then(|n| n.parse::<usize>().ok());
+        found.sort_by_key(number);
+        same(&found, &readings, "two files");
+    }
+    // Other joints under one name, a point that is another one, and one of two readings that is far off: none is a reading of one point.
+    let (readings, names) = repeated(&rows, |_| 2);
+    let mut turned = readings.clone();
+    turned[7].0[2] += 0.5;
+    let other = readings.iter().enumerate().map(|(k, (q, p))| (q.clone(), p.map(|v| v + 5.0 * (k % 2) as f64)));
+    let mut far = readings.clone();
+    far[7].1[1] += 30.0;
+    for (rows, pose) in [(turned, 4), (other.collect(), 1), (far, 4)] {
+        let said = format!("pose `{pose}` stands in line {} already", 2 * pose);
+        refused(&source(&[&one_table(&rows, &names)]), &robot, &[&said, "a name of its own"]);
+    }
 }
 
 #[test]
