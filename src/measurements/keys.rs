@@ -1,7 +1,7 @@
 //! Rows of files that complete each other, joined by the names that both files give them.
 //!
 //! In: the files of one table. Out: the same with their rows in the order of one of them, and a sentence where that is another than they stand in.
-//! A row's name is its `pose`, its number, or a label that ends in its number. Names that stand in the same order need nothing. Rows whose name the
+//! A row's name is its `pose`, what a program calls its target, its number, or a label that ends in its number. Names that stand in the same order need nothing. Rows whose name the
 //! other file does not have are left out and said. What goes wrong: names of which the other file has less than half, which are said, and the rows
 //! paired as they stand; and a name that has more rows than others in a file of several readings a pose, which is refused.
 
@@ -25,7 +25,7 @@ struct Key {
 
 impl Key {
     fn of(part: usize, file: &Part) -> Option<Key> {
-        if file.is_program() || file.rows.is_empty() {
+        if file.rows.is_empty() || file.is_program() && file.label().is_none() {
             return None;
         }
         let own = file.meanings.iter().flatten().position(|name| name.what == What::Own("pose"));
