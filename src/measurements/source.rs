@@ -274,6 +274,7 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
             true => words.iter().map(name).collect(),
             false => given.by_ref().take(width(part, whole)).collect::<Vec<_>>(),
         };
+        let label = part.label();
         let before = part.meanings.take();
         // A unit that the file states stays true of a column that gets another name.
         let with_unit = |(column, name): (usize, Name)| {
@@ -283,6 +284,9 @@ fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool>
         let mut meanings: Vec<Name> = own.into_iter().enumerate().map(with_unit).collect();
         let named = meanings.len();
         meanings.resize(part.width(), Name::of(""));
+        if let Some(column) = label {
+            meanings[column] = Name::of("pose");
+        }
         // What is not named is not looked at.
         for (column, kind) in part.kinds.iter_mut().enumerate().filter(|(c, _)| meanings[*c].what == What::Other) {
             *kind = if column >= named && *kind == Kind::Numbers { Kind::Beyond } else { Kind::Words };

@@ -1,6 +1,7 @@
 //! Where the names of a table's columns stand, if there are any, and where its numbers begin.
 //!
-//! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers is the first row of the table; the row above it has
+//! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers, or has numbers and words where the rows below it have
+//! them, is the first row of the table; the row above it has
 //! the names, one that has nothing but units below the names goes with them, and what stands above is a title. Names that count the columns,
 //! 0, 1, 2, ..., are none.
 //! A comment above the numbers whose words are none of their columns is no row of names.
@@ -24,10 +25,12 @@ pub struct Headed {
 /// Columns from which on names that count them are no readings.
 const COUNTED: usize = 4;
 
+/// Rows below one that tell which of its columns are of numbers.
+const BELOW: usize = 20;
+
 /// Finds the names of a grid; `is_number` says which of its cells are numbers.
 pub fn split(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
-    let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number));
-    let Some(mut first) = first else {
+    let Some(mut first) = first_row(grid, is_number) else {
         let records = grid.rows.iter().flat_map(|(_, row)| row.iter()).any(|cell| cell.starts_with("[{"));
         let hint = match records {
             true => {
@@ -64,12 +67,39 @@ pub fn split(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
 
 /// The rows of a grid whose columns are named otherwise, whatever stands above them.
 pub fn rows_alone(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Result<Headed> {
-    let first = grid.rows.iter().position(|(_, row)| is_data(row, is_number)).unwrap_or(0);
-    Ok(Headed { names: None, rows: even(grid, first, 0)? })
+    Ok(Headed { names: None, rows: even(grid, first_row(grid, is_number).unwrap_or(0), 0)? })
 }
 
 pub fn is_number(cell: &str) -> bool {
     cell.parse::<f64>().is_ok()
+}
+
+/// The first row of the table.
+fn first_row(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Option<usize> {
+    let rows = &grid.rows;
+    (0..rows.len()).find(|&at| is_data(&rows[at].1, is_number) || is_labelled(&rows[at..], is_number))
+}
+
+/// Whether the first of these rows has numbers where most of those below it have numbers, and words where they have words, be these as many as they
+/// may: `A,Main,p1,2.5,3.5,4.5,2024-05-06 10:00:00`. What is counted or sized in names and titles is whole, or stands above words.
+fn is_labelled(rows: &[(u64, Fields)], is_number: &dyn Fn(&str) -> bool) -> bool {
+    let [(_, row), below @ ..] = rows else { return false };
+    let below = &below[..below.len().min(BELOW)];
+    let is_word = |cell: &str| cell.chars().any(char::is_alphanumeric) && !is_number(cell);
+    let most = |column: usize, is: &dyn Fn(&str) -> bool| {
+        2 * below.iter().filter(|(_, r)| r.len() == row.len() && is(&r[column])).count() > below.len()
+    };
+    let is_alike = |(column, cell): (usize, &str)| match (is_number(cell), is_word(cell)) {
+        (true, _) => most(column, is_number),
+        (_, true) => most(column, &is_word),
+        _ => true,
+    };
+    let is_broken = |cell: &str| cell.parse::<f64>().is_ok_and(|v| v.is_finite() && v.fract() != 0.0);
+    let filled = row.iter().filter(|cell| !cell.trim().is_empty()).count();
+    // Of a title in a spreadsheet most cells are empty.
+    row.iter().filter(|cell| is_broken(cell)).count() > 1
+        && 2 * filled > row.len()
+        && row.iter().enumerate().all(is_alike)
 }
 
 /// More numbers than words.
@@ -218,7 +248,7 @@ fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)]
         names.remove(0);
     }
     if let Some(first) = names.first_mut() {
-        *first = first.trim_start_matches(['#', '%']).trim().to_owned();
+        *first = first.trim_start_matches(['#', '%']).trim_start_matches("//").trim().to_owned();
     }
     if names.len() > width {
         names = joined(&names, |_, name| name.starts_with(['[', '(']));
@@ -271,6 +301,15 @@ mod tests {
         let two = "Name Nominal X Nominal Y Measured X Measured Y\nP1 1.5 2 3 4\nP2 3.5 4 5 6\n";
         assert_eq!(names(two).unwrap(), ["Name", "Nominal X", "Nominal Y", "Measured X", "Measured Y"]);
         assert_eq!(names("a b\nr1 1.5 2\nr2 3.5 4\n").unwrap(), ["", "a", "b"]);
+        let labelled = "a,b,p1,1.5,2.5,3,2024-05-06 10:00\na,b,p2,,4.5,6,2024-05-06 10:01\na,b,p3,7,8.5,9,2024-05-06 10:02\na,b,p4,1,8,9.5,2024-05-06 10:03\n";
+        assert_eq!(names(labelled), None);
+        assert_eq!(read(labelled).unwrap().rows.len(), 4);
+        let head = "// of today\n// Set,Group,Target,X,Y,Z,Time\n";
+        assert_eq!(names(&format!("{head}{labelled}")).unwrap(), ["Set", "Group", "Target", "X", "Y", "Z", "Time"]);
+        // Numbers in a title stand above words, or are alone in their row.
+        let title = "tool,at,1.5,2.5,mm,by,me\n";
+        assert_eq!(read(&format!("{title}{labelled}")).unwrap().rows.len(), 4);
+        assert!(read("a,b,c,1.5,2.5\nd,e,f,g,h\n").is_err());
         assert_eq!(names(rows), None);
         assert_eq!(names(&format!("1,2,x\n{rows}")).unwrap(), ["1", "2", "x"]);
         assert_eq!(read(&format!("a,b,c\n{rows}# pause; then on\n1,2,3\n% end\n")).unwrap().rows.len(), 4);

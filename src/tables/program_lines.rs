@@ -4,8 +4,10 @@
 //! brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its lines do, or
 //! one of five where each has a word beside the list.
 //! Lists in calls of different names are no targets of one kind.
+//! What a maker's program calls its targets stands behind their readings, where each has a name of its own.
 //! A list is a row as it stands; numbers beyond the joints are those of axes that the robot does not have.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use camino::Utf8Path;
@@ -25,7 +27,11 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
         if let Ok(targets) = found
             && !targets.is_empty()
         {
-            let row = |t: &programs::Target| (t.line, Fields::new(t.readings.iter().map(f64::to_string)));
+            let named = are_named(&targets);
+            let row = |t: &programs::Target| {
+                let name = named.then(|| t.name.clone());
+                (t.line, Fields::new(t.readings.iter().map(f64::to_string).chain(name)))
+            };
             let rows: Vec<(u64, Fields)> = targets.iter().map(row).collect();
             let others = lines.saturating_sub(rows.len());
             return Some((rows, Form::Program { others, degrees: true, calls: Vec::new() }));
@@ -51,6 +57,14 @@ pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u
         let others = lines - rows.len();
         (rows, Form::Program { others, degrees: false, calls })
     })
+}
+
+/// Whether each target has a name that no other has: a number in a list of positions, and a line, are none.
+fn are_named(targets: &[programs::Target]) -> bool {
+    let is_word =
+        |name: &str| name.starts_with(char::is_alphabetic) && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+    let names: BTreeSet<&str> = targets.iter().map(|t| t.name.as_str()).filter(|name| is_word(name)).collect();
+    names.len() == targets.len()
 }
 
 /// The word of the call that a list of numbers stands in.
@@ -111,6 +125,12 @@ mod tests {
     #[test]
     fn a_makers_program_is_read_in_its_language() {
         let text = "MODULE m\nCONST jointtarget p1 := [[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]];\nENDMODULE\n";
-        assert_eq!(rows("a.mod", text, 6).unwrap(), [["1", "2", "3", "4", "5", "6"]]);
+        assert_eq!(rows("a.mod", text, 6).unwrap(), [["1", "2", "3", "4", "5", "6", "p1"]]);
+        // A target without a name, and a name that stands twice.
+        let bare = "MODULE m\nMoveAbsJ [[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]],v50,fine,tool0;\nENDMODULE\n";
+        assert_eq!(rows("a.mod", bare, 6).unwrap(), [["1", "2", "3", "4", "5", "6"]]);
+        let twice = text.replace("ENDMODULE", &text["MODULE m\n".len()..]);
+        let twice = rows("a.mod", &twice, 6).unwrap();
+        assert!(twice.len() == 2 && twice.iter().all(|row| row.len() == 6), "{twice:?}");
     }
 }

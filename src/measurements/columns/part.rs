@@ -1,5 +1,7 @@
 //! One file of a table: its columns, with names understood where there are any.
 
+use std::collections::BTreeSet;
+
 use camino::Utf8Path;
 
 use crate::files::{Error, Result};
@@ -78,6 +80,9 @@ impl Part {
         let width = headed.rows.first().map_or(0, |(_, row)| row.len());
         let kinds = (0..width).map(|column| kind(&headed.rows, column)).collect();
         let mut meanings: Option<Vec<Name>> = headed.names.as_ref().map(|names| understood(names));
+        if let Some(meanings) = &mut meanings {
+            target_as_name(meanings, &headed.rows);
+        }
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
         }
@@ -100,7 +105,13 @@ impl Part {
 
     /// The same as the file has them.
     pub fn width_of_file(&self) -> usize {
-        self.kinds.len() / self.times
+        self.kinds.len() / self.times - usize::from(self.label().is_some())
+    }
+
+    /// The column with the names that a program gives its targets.
+    pub fn label(&self) -> Option<usize> {
+        let meanings = self.meanings.as_ref().filter(|_| self.is_program())?;
+        meanings.iter().position(|name| name.what == What::Own("pose"))
     }
 
     pub fn is_program(&self) -> bool {
@@ -164,7 +175,11 @@ impl Part {
     /// A column as a message calls it.
     pub fn column_name(&self, column: usize) -> String {
         let name = self.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());
-        name.cloned().unwrap_or_else(|| format!("column {}", column + 1))
+        let unnamed = || match self.label() == Some(column) {
+            true => "name".to_owned(),
+            false => format!("column {}", column + 1),
+        };
+        name.cloned().unwrap_or_else(unnamed)
     }
 
     /// The number of a cell, or none where the cell says so.
@@ -248,9 +263,28 @@ fn understood(names: &[String]) -> Vec<Name> {
     meanings
 }
 
-/// Numbers of a program's line beyond the robot's joints are those of axes that it does not have.
+/// More targets than a body has.
+const MANY: usize = 8;
+
+/// A `target` of which each row has one of its own is the name of the row: the targets of a body come again at other poses.
+fn target_as_name(meanings: &mut [Name], rows: &[(u64, Fields)]) {
+    let own = |wanted: &str| meanings.iter().position(|n| matches!(n.what, What::Own(own) if own == wanted));
+    let Some(column) = own("target").filter(|_| own("pose").is_none() && rows.len() > MANY) else { return };
+    let cells: BTreeSet<&str> =
+        rows.iter().map(|(_, row)| row[column].trim()).filter(|cell| !cell.is_empty()).collect();
+    if cells.len() == rows.len() {
+        meanings[column].what = What::Own("pose");
+    }
+}
+
+/// Numbers of a program's line beyond the robot's joints are those of axes that it does not have; in a language that is known the targets' names stand
+/// there.
 fn of_program(column: usize, joints: usize, degrees: bool) -> Name {
-    let what = if column < joints { What::Joint(column + 1) } else { What::Other };
+    let what = match column {
+        _ if column < joints => What::Joint(column + 1),
+        _ if degrees => What::Own("pose"),
+        _ => What::Other,
+    };
     Name { what, unit: degrees.then_some(Unit::Deg), key: Vec::new(), measured: None }
 }
 
