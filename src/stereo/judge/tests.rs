@@ -7,9 +7,9 @@ use crate::imaging::{Corner, Corners};
 use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::Judged;
-use crate::stereo::judge::ledger::Standards;
+use crate::stereo::judge::ledger::{Case, Standards, ledger};
 use crate::stereo::judge::lengths::second_board::second_board;
-use crate::stereo::judge::verdict::Verdict;
+use crate::stereo::judge::verdict::{LengthError, Verdict};
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::{self, World};
 use crate::stereo::volume::Extent;
@@ -250,5 +250,36 @@ fn boards_that_hardly_tilt_do_not_vouch_for_depths() {
         assert!(flat > 3.0 * tilted, "{flat} {tilted}");
         // A tolerance that the lengths across would meet is not met.
         assert!(flat > 1.5 * across, "{flat} {across}");
+    }
+}
+
+#[test]
+fn where_one_pair_alone_reaches_the_border_more_are_asked_for_there() {
+    let border = 12;
+    // Boards near the middle; one reaches the right border of both pictures, above all others.
+    let mut world = world(border, 71);
+    for pose in &mut world.poses {
+        pose.translation.vector.x *= 0.3;
+        pose.translation.vector.y *= 0.3;
+    }
+    world.poses.push(transform(Vector3::new(0.0, 0.17, 0.0), Vector3::new(100.0, -40.0, 560.0)));
+    let asked = Asked { options: Options::default(), tolerance_mm: TOLERANCE_MM, extent: Extent::Boards };
+    let (found, findings) = calibrate_standing(&world.corners(72), &asked).unwrap();
+    assert_eq!(found.views.len(), border + 1);
+    let Judged { facts, .. } = synthetic::judged(&found, findings, Standards::default(), TOLERANCE_MM);
+    let remedy = |pair: usize, error_mm: f64, lenses_known: bool| {
+        let mut facts = facts.clone();
+        let largest = &mut facts.accuracy.extremes.largest;
+        *largest = LengthError { pair, error_mm, calibration_mm: 5.0, ..*largest };
+        facts.coverage.lenses_known = lenses_known;
+        let lines = ledger(&Case { calibration: &found, facts: &facts });
+        lines.iter().find(|line| line.what == "held-out lengths").unwrap().remedy
+    };
+    let asks = "add pairs with the board at the right border";
+    assert!(remedy(border, 1.0, false).starts_with(asks), "{}", remedy(border, 1.0, false));
+    // A length that is wrong; one that lies in another pair; lenses that were known before.
+    for (pair, error_mm, lenses_known) in [(border, 30.0, false), (3, 1.0, false), (border, 1.0, true)] {
+        let remedy = remedy(pair, error_mm, lenses_known);
+        assert!(remedy.starts_with("look at the worst pair"), "{pair} {error_mm} {lenses_known}: {remedy}");
     }
 }

@@ -68,6 +68,8 @@ fn student_95(freedom: f64) -> f64 {
 /// A length error and what makes it uncertain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LengthError {
+    /// Place of its pair among those that were measured.
+    pub pair: usize,
     /// Its absolute error, mm.
     pub error_mm: f64,
     /// Standard deviation through the corners at both its ends, mm.
@@ -83,9 +85,14 @@ impl LengthError {
         self.expanded_without_corners_mm().hypot(COVERAGE * self.corners_mm)
     }
 
+    /// The calibration's share, expanded, mm.
+    pub fn expanded_calibration_mm(&self) -> f64 {
+        self.expansion.calibration * self.calibration_mm
+    }
+
     /// The share that is not the corners': calibration and board, expanded, mm.
     pub fn expanded_without_corners_mm(&self) -> f64 {
-        (self.expansion.calibration * self.calibration_mm).hypot(self.expansion.board_mm.unwrap_or(0.0))
+        self.expanded_calibration_mm().hypot(self.expansion.board_mm.unwrap_or(0.0))
     }
 
     /// The error may be as large as this, mm. What the corners at its ends scatter by is in the error already.
@@ -156,6 +163,7 @@ mod tests {
     fn a_value_that_is_no_number_never_passes() {
         assert_eq!(Verdict::within(f64::NAN, 1.0), Verdict::Undecided);
         let error = |error_mm| LengthError {
+            pair: 0,
             error_mm,
             corners_mm: 0.0,
             calibration_mm: 0.0,

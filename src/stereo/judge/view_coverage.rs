@@ -3,12 +3,13 @@
 //! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal length from the distance; corners near
 //! the borders determine the lens; different distances separate the lens from the focal length.
 
-use nalgebra::{Point2, Point3};
+use nalgebra::{Point2, Point3, Vector2};
 
 use crate::diagnostic::count;
 use crate::imaging::Side;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::Calibration;
+use crate::stereo::data::{Observation, View};
 use crate::stereo::judge::residual_correlation::{CELLS, Field, ResidualPattern};
 use crate::stereo::volume::{range, tilts_deg};
 
@@ -113,6 +114,36 @@ impl Coverage {
         }
         advice
     }
+}
+
+/// What to photograph where this pair alone reaches farthest out in one of the pictures: nothing checks what it says of the lens there.
+pub(super) fn beyond_others(calibration: &Calibration, pair: usize) -> Option<&'static str> {
+    Side::BOTH.into_iter().find_map(|side| {
+        let camera = calibration.rig().camera(side);
+        let from_centre = |o: &Observation| Vector2::new(o.px.x - camera.cx, o.px.y - camera.cy);
+        let of_view = |(i, view): (usize, &View)| {
+            let seen = view.observations.iter().filter(|o| o.side == side && o.active).map(from_centre);
+            Some((i, seen.max_by(|a, b| a.norm().total_cmp(&b.norm()))?))
+        };
+        let reaches = calibration.views.iter().enumerate().filter_map(of_view);
+        let (farthest, at) = reaches.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))?;
+        let across = at.x.abs() * f64::from(camera.height) > at.y.abs() * f64::from(camera.width);
+        let remedy = match (across, at.x < 0.0, at.y < 0.0) {
+            (true, true, _) => {
+                "add pairs with the board at the left border of the pictures, where one pair alone tells the lens"
+            }
+            (true, false, _) => {
+                "add pairs with the board at the right border of the pictures, where one pair alone tells the lens"
+            }
+            (false, _, true) => {
+                "add pairs with the board at the upper border of the pictures, where one pair alone tells the lens"
+            }
+            (false, _, false) => {
+                "add pairs with the board at the lower border of the pictures, where one pair alone tells the lens"
+            }
+        };
+        (farthest == pair).then_some(remedy)
+    })
 }
 
 /// Whether the other camera sees what lies behind this pixel at one of these distances.

@@ -8,6 +8,7 @@ use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::model_disagreement;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
+use crate::stereo::judge::view_coverage;
 use crate::stereo::volume::Extent;
 
 pub(super) fn held_out_lengths(case: &Case) -> Evidence {
@@ -24,8 +25,10 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     {
         "measure the board's own lengths more finely, and give that: `--board-uncertainty-mm`, or `--measured-mm` with more digits"
     } else {
-        "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
-         or the `--tolerance-mm` that your robot needs"
+        beyond_others(case).unwrap_or(
+            "look at the worst pair in camera-check.html; where all are alike: a flat board on a stand, both cameras triggered at once, \
+             or the `--tolerance-mm` that your robot needs",
+        )
     };
     let detail = format!(
         "{} of all lengths between corners of pairs that the rig had not seen, {} folds: {}. The limit is the tolerance. The largest error of \
@@ -38,6 +41,15 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     );
     let line = Evidence::of_length("held-out lengths", remedy, Some(worst.at_most_mm()), case, detail);
     Evidence { allows: extremes.verdict(case.facts.tolerance_mm), ..line }
+}
+
+/// What to do where the length that decides is uncertain, not wrong, and lies in a pair whose corners lie farther out than all others.
+fn beyond_others(case: &Case) -> Option<&'static str> {
+    let worst = &case.facts.accuracy.extremes.largest;
+    let uncertain_mm = worst.expanded_calibration_mm();
+    let decides = uncertain_mm > worst.error_mm && uncertain_mm > case.facts.tolerance_mm;
+    let lens_told = decides && !case.facts.coverage.lenses_known;
+    lens_told.then(|| view_coverage::beyond_others(case.calibration, worst.pair)).flatten()
 }
 
 /// What is compared with the tolerance.

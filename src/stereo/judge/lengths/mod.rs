@@ -107,6 +107,7 @@ pub(super) fn extremes<'a>(
             let (a, b) = (&measured.points[length.ends.0], &measured.points[length.ends.1]);
             let calibration = covariance_of(i).map_or(0.0, |c| c.length_variance_mm2(a, b));
             let error = LengthError {
+                pair: i,
                 error_mm: length.error_mm.abs(),
                 corners_mm: (share * a.corner_variance_mm2(b)).max(0.0).sqrt(),
                 calibration_mm: calibration.max(0.0).sqrt(),
