@@ -298,12 +298,7 @@ fn flags_that_settle_which_joints_keep_all_targets() {
     };
     let points = "x1,y1,z1,x2,y2,z2,x3,y3,z3";
     let units = ["deg", "rad"].map(|unit| (1..7).map(|j| format!(",q{j} [{unit}]")).collect::<String>()).concat();
-    let sets: [(&str, fn(f64) -> f64); 2] = [
-        (&units, f64::to_radians),
-        // Names that are not known, and none.
-        (",torso,knee,hip,neck,waist,ankle,,,,,,", |q| q + 1e-3 * (9.0 * q).sin()),
-    ];
-    for (joints, again) in sets {
+    let check = |joints: &str, again: fn(f64) -> f64| {
         let file = folder.file("two.csv", format!("{points}{joints}\n{}", beside(again)));
         let flags = ["", "-,-,-,-,-,-,"].map(|skipped| format!("{points},{skipped}j1,j2,j3,j4,j5,j6"));
         let [first, second] = flags.each_ref().map(|flag| format!("`--columns {flag}`"));
@@ -313,5 +308,8 @@ fn flags_that_settle_which_joints_keep_all_targets() {
             let (found, said) = told.read(&robot).unwrap_or_else(|e| panic!("{joints}: {}", report(&e)));
             assert!(found.len() == 72 && said[0].contains("3 targets a pose"), "{joints}: {said:?}");
         }
-    }
+    };
+    check(&units, f64::to_radians);
+    // Names that are not known, and none.
+    check(",torso,knee,hip,neck,waist,ankle,,,,,,", |q| q + 1e-3 * (9.0 * q).sin());
 }
