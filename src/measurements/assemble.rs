@@ -9,6 +9,7 @@ use super::columns::part::{At, Kind, Part};
 use super::columns::pick::{self, listed};
 use super::rows::{Measurement, from_table, reading_name};
 use crate::csv_table::Table;
+use crate::diagnostic::count;
 use crate::files::Result;
 use crate::robot::Robot;
 use crate::tables::names::{Name, What};
@@ -284,7 +285,9 @@ impl Taken<'_> {
         }
         match left.len() {
             0 => String::new(),
-            n if n > NAMED => format!("; not used: {} and {} more columns", left[..NAMED].join(", "), n - NAMED),
+            n if n > NAMED => {
+                format!("; not used: {} and {}", left[..NAMED].join(", "), count(n - NAMED, "more column"))
+            }
             _ => format!("; not used: {}", left.join(", ")),
         }
     }

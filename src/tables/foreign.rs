@@ -70,7 +70,10 @@ fn by_columns(value: &Value) -> bool {
 
 /// What the table of a file is called: each has its own, so that none takes the place of another.
 fn table_of(path: &Utf8Path) -> String {
-    format!("{}.csv", path.file_stem().unwrap_or("table"))
+    let stem = path.file_stem().unwrap_or("table");
+    // The file itself may be called so, whatever is in it.
+    let is_taken = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv"));
+    if is_taken { format!("{stem}-table.csv") } else { format!("{stem}.csv") }
 }
 
 fn in_python(package: &str, frame: &str, path: &Utf8Path) -> String {
@@ -195,5 +198,8 @@ mod tests {
     fn each_file_has_a_table_of_its_own() {
         let of = |name: &str| of_bytes(b"[{\"a\": 1}, {\"a\": 2}]", Utf8Path::new(name)).unwrap().1;
         assert!(of("in/one.json").contains("to_csv('one.csv'") && of("two.json").contains("to_csv('two.csv'"));
+        let matlab = |name: &str| of_bytes(b"MATLAB 5.0 MAT-file", Utf8Path::new(name)).unwrap().1;
+        assert!(matlab("in/q.mat").contains("'q.csv'") && matlab("in/q.csv").contains("'q-table.csv'"));
+        assert!(!matlab("in/q.csv").contains("'q.csv'"));
     }
 }
