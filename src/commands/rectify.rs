@@ -44,8 +44,8 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     pairing.left_out().iter().for_each(progress::note);
     let headers = headers(&pairing.pairs, &rig)?;
     let names: Vec<[String; 2]> = pairing.pairs.iter().map(names).collect();
-    let written: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
-    out.check_free(&written)?;
+    let to_write: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+    out.check_free(&to_write)?;
     out.check_free(&["rectified.json", "rectify.html"])?;
 
     let (mut file, maps, lost) = plan(args, &rig, volume.as_ref())?;
@@ -75,10 +75,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     if kept.is_empty() {
         return Err(imaging::Error::NoneReadable { path: pairing.place, skipped: file.pairs_skipped }.into());
     }
-    let rectified: Vec<PairFiles> = kept
-        .iter()
-        .map(|(pair, [left, right])| PairFiles { pair: pair.clone(), left: out.join(left), right: out.join(right) })
-        .collect();
+    let rectified = written(&out, &kept);
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
     let (file, shown) = judge(file, kept, found);
@@ -91,6 +88,16 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
     Ok(Outcome { stdout, status: status.or_worse(at_best) })
+}
+
+/// The pairs as they were written.
+fn written(out: &OutDir, kept: &[(String, [String; 2])]) -> Vec<PairFiles> {
+    let files = |(pair, [left, right]): &(String, [String; 2])| PairFiles {
+        pair: pair.clone(),
+        left: out.join(left),
+        right: out.join(right),
+    };
+    kept.iter().map(files).collect()
 }
 
 /// The headers of all pictures. Another size than the calibration's ends the run before anything is written; a picture

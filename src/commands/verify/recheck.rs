@@ -38,10 +38,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let (set, is_mended) = mended(of_targets(&rows, against)?, &robot, before.p95_mm, config)?;
     let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
     let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &robot.ends.root_from_frame0);
-    let paths = source.paths();
-    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).collect();
-    let run = Run { force: args.force, ..run };
-    let out = OutDir::open(args.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs);
+    let out = opened(args, against, config, run, &source.paths())?;
     out.check_free(&["verify.json", HISTORY, "verify.html"])?;
     let mut checks = formats::history(&out, HISTORY)?;
 
@@ -86,6 +83,13 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let least = if advised_against || is_mended.is_some() { Status::OutOfTolerance } else { Status::Done };
     let status = standing.status().or_worse(least);
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
+}
+
+/// The results folder of a run that reads these files and the robot.
+fn opened(args: &Verify, against: &Utf8Path, config: &Config, run: Run, paths: &[Utf8PathBuf]) -> Result<OutDir> {
+    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).collect();
+    let run = Run { force: args.force, ..run };
+    Ok(OutDir::open(args.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs))
 }
 
 /// The rows, whose targets stand where the robot's identification found them.

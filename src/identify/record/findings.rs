@@ -48,17 +48,18 @@ impl Findings {
             return Findings { against, doubts: examined, notes: Vec::new() };
         }
         let left_mm = found.scatter.point_mm;
-        let noise = of_noise(set, found);
+        let rounded = rounded::of_joints(set, found);
+        // What rounded angles leave is not the instrument's.
+        let noise = of_noise(set, found).filter(|_| rounded.is_none());
         let far_beyond_mm = FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
         let beyond_all = || (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained(left_mm));
-        let unexplained = unexplained.filter(|_| !is_explained(set, found)).or_else(beyond_all);
+        let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
         let is_reached = unexplained.is_none();
         let errors = |set: &Dataset| {
             let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
             judge.errors(found.robot(), &found.outliers)
         };
         let left_out = left_out::of_a_joint(set, found.robot(), &found.fitted, &found.outliers, &errors);
-        let rounded = rounded::of_joints(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let against: Vec<Finding> = left_out
             .into_iter()
@@ -99,7 +100,12 @@ impl Findings {
 /// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it, or leaves
 /// nothing but the readings' scatter.
 pub fn is_explained(set: &Dataset, found: &Identification) -> bool {
-    few_left_out(found) && (found.scatter.point_mm < conventions::IMPLAUSIBLE_MM || of_noise(set, found).is_some())
+    is_plausible(found) || of_noise(set, found).is_some()
+}
+
+/// Whether a built robot may have what is left.
+fn is_plausible(found: &Identification) -> bool {
+    few_left_out(found) && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
 }
 
 fn few_left_out(found: &Identification) -> bool {

@@ -10,68 +10,67 @@ fn said(files: &str, needed: usize, by: Option<PairBy>) -> Result<String, String
     found.map(|found| found.taken).map_err(|e| crate::diagnostic::report(&e).replace(path.as_str(), "IMAGES"))
 }
 
-#[test]
-fn what_gives_way_is_said_as_not_taken() {
-    for (files, needed, taken) in [
-        // A few stray pairs beside enough.
-        (
-            "set/{left,right}Img{1..7}.png demo/img{L,R}{1,2}.png",
-            4,
-            "7 pairs by name: left set/leftImg*.png, right set/rightImg*.png; not taken: demo/ (4 pictures)",
-        ),
-        (
-            "{left,right}_{1,image}.png stereo{L,R}/{1..6}.png",
-            4,
-            "6 pairs by name: left stereoL/*.png, right stereoR/*.png; not taken: ./ (4 pictures)",
-        ),
-        (
-            "demo/{left,right}.png {caml,camr}/{1..4}.png",
-            4,
-            "4 pairs by name: left caml/*.png, right camr/*.png; not taken: demo/ (2 pictures)",
-        ),
-        (
-            "a/{left,right}{1..3}.png b/{left,right}1.png",
-            3,
-            "3 pairs by name: left a/left*.png, right a/right*.png; not taken: b/ (2 pictures)",
-        ),
-        (
-            "cam{0,1}/{1..5}.png cam2/{1..3}.png",
-            4,
-            "5 pairs by name: left cam0/*.png, right cam1/*.png; no word tells left from right: the first by name is left; \
+/// Files, the pairs that are needed, and what is said of what is taken.
+const TAKEN: [(&str, usize, &str); 10] = [
+    // A few stray pairs beside enough.
+    (
+        "set/{left,right}Img{1..7}.png demo/img{L,R}{1,2}.png",
+        4,
+        "7 pairs by name: left set/leftImg*.png, right set/rightImg*.png; not taken: demo/ (4 pictures)",
+    ),
+    (
+        "{left,right}_{1,image}.png stereo{L,R}/{1..6}.png",
+        4,
+        "6 pairs by name: left stereoL/*.png, right stereoR/*.png; not taken: ./ (4 pictures)",
+    ),
+    (
+        "demo/{left,right}.png {caml,camr}/{1..4}.png",
+        4,
+        "4 pairs by name: left caml/*.png, right camr/*.png; not taken: demo/ (2 pictures)",
+    ),
+    (
+        "a/{left,right}{1..3}.png b/{left,right}1.png",
+        3,
+        "3 pairs by name: left a/left*.png, right a/right*.png; not taken: b/ (2 pictures)",
+    ),
+    (
+        "cam{0,1}/{1..5}.png cam2/{1..3}.png",
+        4,
+        "5 pairs by name: left cam0/*.png, right cam1/*.png; no word tells left from right: the first by name is left; \
              not taken: cam2/ (3 pictures)",
-        ),
-        // A folder is read from above as it is read by itself, where that has enough.
-        (
-            "game/{left,right,board}.png game/{Left,Right}/{1..5}.png",
-            1,
-            "5 pairs by name: left game/Left/*.png, right game/Right/*.png; not taken: game/ (3 pictures)",
-        ),
-        (
-            "game/{left,right}{1..5}.png game/{left,right}/1.png",
-            4,
-            "5 pairs by name: left game/left*.png, right game/right*.png; not taken: game/left/ (1 picture), game/right/ (1 picture)",
-        ),
-        // Results beside the pictures that they were made of.
-        (
-            "data/{corners,images,rectified}/{left,right}/Im_{1..5}.png",
-            4,
-            "5 pairs by name: left data/images/left/Im_*.png, right data/images/right/Im_*.png; \
+    ),
+    // A folder is read from above as it is read by itself, where that has enough.
+    (
+        "game/{left,right,board}.png game/{Left,Right}/{1..5}.png",
+        1,
+        "5 pairs by name: left game/Left/*.png, right game/Right/*.png; not taken: game/ (3 pictures)",
+    ),
+    (
+        "game/{left,right}{1..5}.png game/{left,right}/1.png",
+        4,
+        "5 pairs by name: left game/left*.png, right game/right*.png; not taken: game/left/ (1 picture), game/right/ (1 picture)",
+    ),
+    // Results beside the pictures that they were made of.
+    (
+        "data/{corners,images,rectified}/{left,right}/Im_{1..5}.png",
+        4,
+        "5 pairs by name: left data/images/left/Im_*.png, right data/images/right/Im_*.png; \
              not taken: data/corners/left/ (5 pictures), data/corners/right/ (5 pictures), data/rectified/left/ (5 pictures), \
              data/rectified/right/ (5 pictures)",
-        ),
-        (
-            "{left,right}Raw/{1..5}.png {left,right}Rectified/{1..5}.png",
-            1,
-            "5 pairs by name: left leftRaw/*.png, right rightRaw/*.png; \
+    ),
+    (
+        "{left,right}Raw/{1..5}.png {left,right}Rectified/{1..5}.png",
+        1,
+        "5 pairs by name: left leftRaw/*.png, right rightRaw/*.png; \
              not taken: leftRectified/ (5 pictures), rightRectified/ (5 pictures)",
-        ),
-        // Results alone are what there is.
-        (
-            "rectified/{left,right}{1..5}.png",
-            4,
-            "5 pairs by name: left rectified/left*.png, right rectified/right*.png",
-        ),
-    ] {
+    ),
+    // Results alone are what there is.
+    ("rectified/{left,right}{1..5}.png", 4, "5 pairs by name: left rectified/left*.png, right rectified/right*.png"),
+];
+
+#[test]
+fn what_gives_way_is_said_as_not_taken() {
+    for (files, needed, taken) in TAKEN {
         assert_eq!(said(files, needed, None).as_deref(), Ok(taken), "{files}");
     }
 }
