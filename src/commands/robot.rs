@@ -102,7 +102,10 @@ fn open(args: &RobotImport, readings: &[dh_csv::Reading], ways: &[Way]) -> Error
     if readings.len() > 1 {
         let orders: Vec<String> = readings.iter().map(|r| format!("`--columns {}`", r.columns)).collect();
         let message = "the columns have no names, and more than one order could be".to_owned();
-        let hint = format!("{} says which; `--measurements FILE` lets the readings decide", orders.join(" or "));
+        let hint = format!(
+            "{}, or another order of these, says which; `--measurements FILE` lets the readings decide",
+            orders.join(" or ")
+        );
         return refuse(args, message, &hint);
     }
     let why = ways.first().map_or(String::new(), |(r, _)| format!(": {} ({})", r.convention().1, r.said));

@@ -20,9 +20,10 @@ pub const HINT: &str = "`stereocal robot new ur5e` makes the nominal robot of an
 pub fn deviations(text: &str) -> Option<(u64, String)> {
     let at = |name: &str| {
         let is_it = |line: &str| {
-            let behind =
-                line.trim_start_matches(|c: char| c.is_whitespace() || matches!(c, '"' | '{')).strip_prefix(name);
-            behind.is_some_and(|behind| behind.trim_start_matches(['"', ' ']).starts_with(['=', ':']))
+            let behind = line
+                .trim_start_matches(|c: char| c.is_whitespace() || matches!(c, '"' | '\'' | '{'))
+                .strip_prefix(name);
+            behind.is_some_and(|behind| behind.trim_start_matches(['"', '\'', ' ']).starts_with(['=', ':']))
         };
         text.lines().position(is_it)
     };
@@ -92,7 +93,7 @@ mod tests {
         let controller = "[mounting]\ndelta_theta = [ 1.5e-08, 0.3]\ndelta_a = [ 2.5e-05, 0.01]\ndelta_d = [ 1e-05, 90.5]\ndelta_alpha = [ 1e-4, 2e-3]\n\
             joint_checksum = [ 0x1f, 0x2e]\n";
         assert!(deviations(controller).is_some_and(|(_, what)| what.contains("calibration.conf")));
-        assert!(deviations(&controller.replace(" =", ":")).is_some());
+        assert!(deviations(&controller.replace(" =", ":").replace("delta_a:", "'delta_a':")).is_some());
         for none in [controller.replace("delta_", ""), controller.replace("delta_alpha", "alpha"), String::new()] {
             assert_eq!(deviations(&none), None, "{none}");
         }

@@ -1,7 +1,7 @@
 //! The rows of a table in LaTeX: cells with `&` between them, rows that `\\` ends, rules between these.
 //!
-//! In: a document. Out: its table, each row with its line, cells as formulas have them (`-90°`, `pi/2`). Of several tables the one whose first row names
-//! alpha is the robot's. What goes wrong: two of these, and an environment without its end; refused with the line.
+//! In: a document. Out: its table, each row with its line, cells as formulas have them (`-90°`, `pi/2`). A table whose first row names
+//! alpha, or a twist, is the robot's. What goes wrong: two of these, and an environment without its end; refused with the line.
 
 use crate::formats::robots::dh_text::Wrong;
 use crate::tables::Fields;
@@ -56,7 +56,7 @@ const MARKS: [(&str, &str); 26] = [
     ("$", ""),
 ];
 
-/// The robot's table of a document; none where it has none at all.
+/// The robot's table of a document; none where it has none.
 pub(super) fn table(text: &str) -> Result<Option<Vec<(u64, Fields)>>, Wrong> {
     let plain: String = text.lines().map(|line| without_comment(line).to_owned() + "\n").collect();
     let mut tables = Vec::new();
@@ -69,11 +69,11 @@ pub(super) fn table(text: &str) -> Result<Option<Vec<(u64, Fields)>>, Wrong> {
         let rows = rows(&plain, behind_arguments(&behind[..end], *arguments));
         tables.extend((rows.len() > 1).then_some(rows));
     }
-    let is_named =
-        |rows: &Vec<(u64, Fields)>| rows[0].1.iter().any(|cell| cell.contains("alpha") || cell.contains('\u{3b1}'));
-    if tables.iter().any(is_named) {
-        tables.retain(is_named);
-    }
+    // Matrices of formulas, and tables of something else.
+    let is_named = |rows: &Vec<(u64, Fields)>| {
+        rows[0].1.iter().any(|cell| ["alpha", "\u{3b1}", "wist"].iter().any(|word| cell.contains(word)))
+    };
+    tables.retain(is_named);
     if let [one, other, ..] = &tables[..] {
         let message = format!(
             "a second table begins here; another is at line {}, and which is the robot's is not said: leave one of them in the file",

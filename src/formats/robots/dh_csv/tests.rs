@@ -233,7 +233,9 @@ fn limits_are_read_or_said_to_be_left_out() {
 #[test]
 fn a_table_in_a_document_is_read_without_what_is_around_it() {
     let rows = "&alpha; | a | d | &theta;\n:--:|:--:|:--:|:--:\n0 | 0 | 0.75 | q&#8321;\n-&pi;/2 | 0.35 | 0 | q&#x2082;-&pi;/2\n0 | 1.25 | 0 | q<sub>3</sub>\n";
-    let document = format!("# An arm\n\nAs | said | in | [1]:\n\n{rows}\nThe offset is what `q` begins at, in rad.\n");
+    let document = format!(
+        "# An arm\n\nAs | said | in | [1]:\n\n{rows}\nThe offset is what `q` begins at, in rad.\n$$\\begin{{array}}{{cc}} c & -s \\\\ s & c \\end{{array}}$$\n"
+    );
     let found = one("README.md", &document);
     assert_eq!((found.rows.len(), found.rows[1]), (3, [-90.0, 350.0, -90.0, 0.0]));
     assert!(said("README.md", &format!("{document}\n{rows}")).contains("a second table begins here"));
