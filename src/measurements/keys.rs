@@ -36,11 +36,20 @@ impl Key {
         };
         let named = own.or_else(|| file.names.iter().flatten().position(naming));
         let bare = file.names.as_ref().is_none_or(|names| names[0].is_empty());
-        let column = named.or_else(|| bare.then_some(0))?;
-        let names = names(file, column)?;
-        let numbers = names.iter().all(|name| name.chars().all(|c| c.is_ascii_digit()));
-        let key = Key { part, column, said: named.is_some(), names };
-        (key.said || numbers && key.is_distinct()).then_some(key)
+        // Without names of columns what a row belongs to may stand before its label.
+        let labels = (1..file.width()).filter(|&column| file.names.is_none() && file.kinds[column] == Kind::Words);
+        let columns: Vec<usize> = match named {
+            Some(column) => vec![column],
+            None if bare => std::iter::once(0).chain(labels).collect(),
+            None => Vec::new(),
+        };
+        let key = |column: usize| {
+            let names = names(file, column)?;
+            let numbers = names.iter().all(|name| name.chars().all(|c| c.is_ascii_digit()));
+            let key = Key { part, column, said: named.is_some(), names };
+            (key.said || numbers && key.is_distinct()).then_some(key)
+        };
+        columns.into_iter().find_map(key)
     }
 
     fn set(&self) -> BTreeSet<&str> {

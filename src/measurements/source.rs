@@ -249,8 +249,9 @@ fn is_own(part: &Part) -> bool {
 /// Names the columns of all files in their order; says whether the files are one table side by side.
 fn name_columns(parts: &mut [Part], columns: &str, count: usize) -> Result<bool> {
     let words: Vec<&str> = columns.split(',').map(str::trim).collect();
-    let width =
-        |part: &Part, whole: bool| if part.is_program() && !whole { count.min(part.width()) } else { part.width() };
+    let width = |part: &Part, whole: bool| {
+        if part.is_program() && !whole { count.min(part.width()) } else { part.width_of_file() }
+    };
     let whole = words.len() == parts.iter().map(|p| width(p, true)).sum::<usize>();
     let total: usize = parts.iter().map(|p| width(p, whole)).sum();
     let name = |word: &&str| if *word == "-" { Name::of("") } else { Name::of(word) };

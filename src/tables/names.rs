@@ -157,7 +157,10 @@ impl Name {
         };
         let counted = rest.windows(2).find_map(counts);
         rest.retain(|word| !(counted.as_ref() == Some(word) || is_in(PLAIN, word)));
-        let measured = match (says(COMMANDED, &rest), says(MEASURED, &rest)) {
+        // `T_x` and `T14` are of a transform, `x_t` of a target.
+        let point = matches!(what, What::Coordinate(_) | What::Matrix(..));
+        let transform = point && words[0] == "t" && rest.first() == words.first();
+        let measured = match (says(COMMANDED, &rest[usize::from(transform)..]), says(MEASURED, &rest)) {
             (true, _) => Some(false),
             (false, true) => Some(true),
             _ => None,
@@ -369,7 +372,11 @@ mod tests {
             assert_eq!((Name::of(name).key, what(name).2), (vec!["2".to_owned()], None), "{name}");
         }
         assert_eq!(what("m_03").0, What::Matrix(0, 3));
-        assert_eq!(what("T14").0, What::Matrix(1, 4));
+        assert_eq!(what("T14"), (What::Matrix(1, 4), None, None));
+        assert_eq!(what("T_x"), (What::Coordinate(0), None, None));
+        for name in ["T_cmd_x", "n_x", "d_x", "x_t", "xt"] {
+            assert_eq!(what(name).2, Some(false), "{name}");
+        }
         assert_eq!(what("L").0, What::Distance);
         assert_eq!(what("dist_coeffs_1").0, What::Other);
         assert_eq!(what("distance_mm"), (What::Distance, Some(Unit::Mm), None));

@@ -1,6 +1,7 @@
 //! Which columns of a table are the joints, which the measured points, and in what units.
 
 pub(super) mod apart;
+mod differences;
 pub(super) mod judge;
 pub(super) mod layout;
 pub(super) mod part;

@@ -4,6 +4,7 @@
 //! quaternion `Q0..Q3`) is none. Points are three columns whose names differ in x, y, z alone, or the last column of a 4x4 matrix. Points that
 //! are commanded, nominal or computed by their names are never taken. What goes wrong: two sets that would do are asked about.
 
+use super::differences;
 use super::part::{At, Part};
 use crate::files::{Error, Result};
 use crate::robot::{Joint, Robot};
@@ -245,14 +246,28 @@ fn points(parts: &[Part]) -> Result<Vec<(String, [At; 3], Option<bool>)>> {
         && let Some(columns) = commanded
         && !parts.iter().any(|p| !p.free().is_empty() || p.names_any(|w| *w == What::Distance))
     {
-        let message = format!(
-            "{} are where the robot was sent, or computed, by their names; no column has what was measured",
-            listed(parts, &columns)
-        );
-        let hint = "join the file of the measured points with another `--measurements FILE`, or name the columns with `--columns`";
-        return Err(parts[columns[0].part].refuse(message, Some(hint)));
+        return Err(sent_alone(parts, &columns));
     }
     Ok(sets.into_iter().map(|(_, at, measured)| (String::new(), at, measured)).collect())
+}
+
+/// That no name is of what was measured; with what to do where there are differences from where the robot was sent.
+fn sent_alone(parts: &[Part], sent: &[At; 3]) -> Error {
+    let part = sent[0].part;
+    let mut message = format!(
+        "{} are where the robot was sent, or computed, by their names; no column has what was measured",
+        listed(parts, sent)
+    );
+    let mut hint =
+        "join the file of the measured points with another `--measurements FILE`, or name the columns with `--columns`";
+    if let Some(columns) = differences::of(&parts[part]) {
+        let listed = listed(parts, &columns.map(|column| At { part, column }));
+        message +=
+            &format!("; {listed} look like differences of measured and commanded, and nothing says of which sign");
+        hint = "make columns `x_meas,y_meas,z_meas` of the measured point: where a difference is measured minus commanded, it is the commanded \
+                point plus the difference, where it is commanded minus measured, the commanded point minus it";
+    }
+    parts[part].refuse(message, Some(hint))
 }
 
 /// Names of targets, where the sets' names differ in one number or letter alone; one may be without.

@@ -220,3 +220,31 @@ fn a_joint_that_slides_is_read_in_its_own_unit() {
         refused(&source(&[&file]), &turning, &[&what, "prismatic"]);
     }
 }
+
+#[test]
+fn a_transform_is_no_command_and_differences_are_not_added() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let cells = |q: &[f64], p: &[f64; 3]| {
+        let [x, y, z] = p.map(|v| v / 1000.0);
+        let matrix =
+            format!("[[1.0, 0.0, 0.0, {x}], [0.0, 1.0, 0.0, {y}], [0.0, 0.0, 1.0, {z}], [0.0, 0.0, 0.0, 1.0]]");
+        format!("\"[{}]\",\"{matrix}\"", list(&q.iter().map(|v| v.to_radians()).collect::<Vec<_>>(), ", "))
+    };
+    let file = folder.file("transforms.csv", format!("joint_positions,T\n{}", lines(&rows, cells)));
+    let (found, said) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+    same(&found, &rows, "transforms");
+    assert!(said[0].contains("T_x"), "{said:?}");
+    let off =
+        |q: &[f64], p: &[f64; 3]| [q.to_vec(), p.map(|v| v + v.sin()).to_vec(), p.map(|v| -v.sin()).to_vec()].concat();
+    let head = "J1,J2,J3,J4,J5,J6,x_t,y_t,z_t";
+    let differ = folder.file("differ.csv", text(&format!("{head},x_dif,y_dif,z_dif"), &rows, ",", off));
+    refused(
+        &source(&[&differ]),
+        &robot,
+        &["x_t to z_t are where", "x_dif to z_dif look like differences", "x_meas,y_meas"],
+    );
+    let turned = folder.file("turned.csv", text(&format!("{head},rx_err,ry_err,rz_err"), &rows, ",", off));
+    let error = source(&[&turned]).read(&robot).map(|_| ()).expect_err("no point was measured");
+    assert!(!report(&error).contains("differences"), "{}", report(&error));
+}

@@ -247,3 +247,53 @@ fn what_measurements_leave_open_is_said_where_they_are_to_choose_a_way_to_read_a
     );
     assert!(said.contains("in: both.csv"), "{said}");
 }
+
+/// A program's targets in their order, each with what `name` calls it.
+fn program(rows: &Rows, name: impl Fn(usize) -> String) -> String {
+    let target = |(i, (q, _)): (usize, &(Vec<f64>, [f64; 3]))| {
+        let numbers: Vec<String> = q.iter().map(|v| format!("{v:.12}")).collect();
+        let external = "[9E9,9E9,9E9,9E9,9E9,9E9]";
+        format!("CONST jointtarget {}:=[[{}],{external}];\n", name(i), numbers.join(","))
+    };
+    format!("MODULE m\n{}ENDMODULE\n", rows.iter().enumerate().map(target).collect::<String>())
+}
+
+/// What a tracker's program exports: where a point belongs, its name, the point and when it was measured.
+fn exported(rows: &Rows, order: impl Iterator<Item = usize>) -> String {
+    let line = |i: usize| {
+        let [x, y, z] = rows[i].1;
+        format!("A,Main,p{},{x},{y},{z},2024-05-06 10:{i:02}:00\n", i + 1)
+    };
+    order.map(line).collect()
+}
+
+#[test]
+fn points_of_an_export_are_joined_with_a_programs_targets_by_their_names() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let targets = folder.file("q.mod", program(&rows, |i| format!("p{}", i + 1)));
+    let shuffled = || (0..30).map(|i| (7 * i + 3) % 30);
+    let names = "Collection,Group,Target,X,Y,Z,Timestamp\n";
+    let plain = exported(&rows, 0..30);
+    for (name, text) in [
+        ("bare.txt", plain.clone()),
+        ("named.txt", format!("{names}{plain}")),
+        ("noted.txt", format!("// of a tracker\n// {names}{plain}")),
+        ("shuffled.txt", format!("{names}{}", exported(&rows, shuffled()))),
+        ("shuffled-bare.txt", exported(&rows, shuffled())),
+    ] {
+        let points = folder.file(name, text);
+        let (found, said) =
+            source(&[&targets, &points]).read(&robot).unwrap_or_else(|e| panic!("{name}: {}", report(&e)));
+        same(&found, &rows, name);
+        let joined = said.iter().any(|said| said.contains("rows joined by `name`, not by their order"));
+        assert_eq!(joined, name.starts_with("shuffled"), "{said:?}");
+        assert_eq!(found[4].at.pose, "p5", "{name}");
+    }
+    // Names of other points join nothing.
+    let others = folder.file("r.mod", program(&rows, |i| format!("a{}", 100 * (i + 1))));
+    let points = folder.file("points.txt", format!("{names}{plain}"));
+    let (found, said) = source(&[&others, &points]).read(&robot).expect("in their order");
+    same(&found, &rows, "in their order");
+    assert!(said.iter().any(|said| said.contains("the rows are paired in their order")), "{said:?}");
+}
