@@ -121,7 +121,7 @@ fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
         unit: if size.is_some() { "mm" } else { "px" },
         action: format!(
             "the pictures of the pairs were not taken at one moment: {otherwise}half of the pairs miss the rig by {:.2} px and more, the left camera alone \
-             its pictures by {left_px:.2} px and the right one by {right_px:.2} px; the worst are {}. Trigger both cameras at once, or hold the board still",
+             its pictures by {left_px:.2} px and the right one by {right_px:.2} px; the worst are {}",
             misfit.usual_px,
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
@@ -189,8 +189,7 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64,
         unit: "%",
         action: format!(
             "the board's {} are {:.digits$} times as wide as high, not {said:.digits$} times as was said: with that half of the pairs miss \
-             the rig by {left_px:.3} px and more, instead of {before_px:.3} px. Measure the board along and across, and give \
-             `--measured-mm WxH`",
+             the rig by {left_px:.3} px and more, instead of {before_px:.3} px",
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),
