@@ -75,6 +75,7 @@ pub mod ranges;
 pub mod statistics;
 #[doc(hidden)]
 pub mod tables;
+mod widest;
 
 #[doc(hidden)]
 pub mod imaging;

@@ -3,7 +3,7 @@
 //! Rank is treated in one way: a symmetric matrix is brought to a unit diagonal, so that radians and mm are comparable, and what it says along
 //! eigenvectors below `RANK` is nothing. Such directions stay where they are.
 
-use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, SymmetricEigen};
+use nalgebra::{Cholesky, DMatrix, DVector, Dim, Matrix, RawStorage, SymmetricEigen};
 
 /// Relative size below which an eigenvalue of a normal matrix counts as zero.
 const RANK: f64 = 1e-13;
@@ -41,6 +41,18 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
         }
     }
     DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
+}
+
+/// The solution of normal equations that may lack rank; what they do not determine is zero.
+pub fn solution(matrix: &DMatrix<f64>, right: &DVector<f64>) -> DVector<f64> {
+    let by_cholesky = || {
+        let (scaled, scale) = to_unit_diagonal(matrix)?;
+        let (cholesky, n) = (Cholesky::new(scaled)?, matrix.nrows() as f64);
+        // The trace is n: the largest eigenvalue is at most n, and the product of all but the smallest is below e.
+        let is_whole = cholesky.determinant() > std::f64::consts::E * n * RANK;
+        is_whole.then(|| cholesky.solve(&right.component_mul(&scale)).component_mul(&scale))
+    };
+    by_cholesky().unwrap_or_else(|| pseudo_inverse(matrix.clone()) * right)
 }
 
 /// How many directions a normal matrix determines.
@@ -105,5 +117,21 @@ mod tests {
         let twice = DMatrix::from_fn(9, 2, |r, _| (r as f64).cos() * 1e6);
         let left = without(&columns(2, 0), &twice);
         assert!((left - without(&columns(2, 0), &twice.columns(0, 1).into_owned())).amax() < 1e-9);
+    }
+
+    #[test]
+    fn a_solution_is_that_of_the_pseudo_inverse_with_and_without_rank() {
+        let right = DVector::from_fn(4, |r, _| (r as f64).sin());
+        let mut columns = columns(4, 0);
+        columns.column_mut(2).scale_mut(1e6);
+        for lacks in [false, true] {
+            if lacks {
+                let first = columns.column(0).into_owned();
+                columns.set_column(3, &(first * -2.5));
+            }
+            let normal = product(&columns, &columns);
+            let expected = pseudo_inverse(normal.clone()) * &right;
+            assert!((solution(&normal, &right) - &expected).norm() < 1e-9 * expected.norm(), "{lacks}");
+        }
     }
 }

@@ -42,9 +42,9 @@ struct JointScrews {
 /// A joint's turn with its sine and cosine, from which those of turns near it follow without another call.
 #[derive(Debug, Clone, Copy)]
 pub struct Turn {
-    rad: f64,
-    sine: f64,
-    cosine: f64,
+    pub(super) rad: f64,
+    pub(super) sine: f64,
+    pub(super) cosine: f64,
 }
 
 impl Turn {
@@ -54,12 +54,21 @@ impl Turn {
         Turn { rad, sine, cosine }
     }
 
-    /// Sine and cosine of another turn: of the difference by their series, which end below the last digit, where it is small.
-    fn sin_cos(&self, rad: f64) -> (f64, f64) {
+    /// Sine and cosine of another turn.
+    pub fn sin_cos(&self, rad: f64) -> (f64, f64) {
+        if self.is_near(rad) { self.near(rad) } else { rad.sin_cos() }
+    }
+
+    /// Whether another turn is so near that [`Turn::near`] has it to the last digit.
+    #[inline(always)]
+    pub(super) fn is_near(&self, rad: f64) -> bool {
+        (rad - self.rad).abs() <= 0.1
+    }
+
+    /// Sine and cosine of a turn that is near: of the difference by their series, which end below the last digit.
+    #[inline(always)]
+    pub(super) fn near(&self, rad: f64) -> (f64, f64) {
         let by = rad - self.rad;
-        if by.abs() > 0.1 {
-            return rad.sin_cos();
-        }
         // The reciprocals are constants: a division costs as much as ten products.
         let nested = |square: f64, [a, b, c]: [f64; 3]| 1.0 - square * a * (1.0 - square * b * (1.0 - square * c));
         let square = by * by;
@@ -70,26 +79,26 @@ impl Turn {
 }
 
 /// Alpha and beta of the joints where nothing tilts them.
-pub struct Links(Vec<[Turn; 2]>);
+pub struct Links(pub Vec<[Turn; 2]>);
 
 impl Links {
     pub fn new(joints: &[Joint]) -> Links {
         Links(joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect())
     }
+}
 
-    /// Goes along the chain; `see` gets every joint's screws. The flange's rotation and the target's point, base frame, mm. `near` are turns
-    /// of the joints that theirs are near to, where such are known.
-    #[inline]
-    fn along(
-        &self,
-        bent: &Bent,
-        near: &[Turn],
-        tool_mm: &Vector3<f64>,
-        mut see: impl FnMut(JointScrews),
-    ) -> (Matrix3<f64>, Point3<f64>) {
+impl Screws {
+    /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
+    pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
+        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints), &[])
+    }
+
+    /// The same with the links of the robot as it is before anything tilts it, and turns that the joints' are near to, where such are known.
+    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links, near: &[Turn]) -> Screws {
+        let mut joints = Vec::with_capacity(bent.joints.len());
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();
-        for (i, ((joint, &q), [alpha, beta])) in bent.joints.iter().zip(&bent.joints_rad).zip(&self.0).enumerate() {
+        for (i, ((joint, &q), [alpha, beta])) in bent.joints.iter().zip(&bent.joints_rad).zip(&links.0).enumerate() {
             let ((sa, ca), (sb, cb)) = (alpha.sin_cos(joint.alpha_rad), beta.sin_cos(joint.beta_rad));
             let turn_rad = joint.turn_rad(q);
             let (st, ct) = near.get(i).map_or_else(|| turn_rad.sin_cos(), |near| near.sin_cos(turn_rad));
@@ -101,30 +110,11 @@ impl Links {
             origin += joint.a_mm * x;
             let x1 = cb * x - sb * z1;
             let z = sb * x + cb * z1;
-            see(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
+            joints.push(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
             origin += joint.shift_mm(q) * z;
             rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
         }
-        (rotation, origin + rotation * tool_mm)
-    }
-
-    /// The flange's rotation and the target's point, base frame, mm, of the robot as it stands.
-    pub fn end(&self, bent: &Bent, near: &[Turn], tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
-        self.along(bent, near, tool_mm, |_| {})
-    }
-}
-
-impl Screws {
-    /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
-    pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
-        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints), &[])
-    }
-
-    /// The same with the links of the robot as it is before anything tilts it, and turns that the joints' are near to.
-    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links, near: &[Turn]) -> Screws {
-        let mut joints = Vec::with_capacity(bent.joints.len());
-        let (base_from_flange, target_mm) = links.along(bent, near, tool_mm, |joint| joints.push(joint));
-        Screws { joints, base_from_flange, target_mm }
+        Screws { joints, base_from_flange: rotation, target_mm: origin + rotation * tool_mm }
     }
 
     /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).

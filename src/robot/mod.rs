@@ -10,6 +10,7 @@ pub mod corrections;
 pub mod file;
 pub mod inverse;
 pub mod jacobian;
+pub mod lanes;
 pub mod parameters;
 pub mod refit;
 pub mod tool_fit;

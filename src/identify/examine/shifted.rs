@@ -8,6 +8,7 @@
 //! the shift; rows that were left out between count as none.
 
 use nalgebra::{Matrix3, Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::geometry::{Transform, fitted_frame, rotation_matrix};
 use crate::identify::data::dataset::{Dataset, Kind};
@@ -101,13 +102,14 @@ pub fn find(set: &Dataset, robot: &Robot) -> Option<Shift> {
     let last = count - FEWEST;
     let step = (count / GRID).max(1);
     let shifts = || (-MOST..=MOST).filter(|by| *by != 0);
-    let best_of = |starts: &mut dyn Iterator<Item = (usize, isize)>| {
-        starts.map(|(from, by)| (rows.left(from, by), from, by)).min_by(|a, b| a.0.mean.total_cmp(&b.0.mean))
+    let best_of = |starts: Vec<(usize, isize)>| {
+        let left: Vec<_> = starts.into_par_iter().map(|(from, by)| (rows.left(from, by), from, by)).collect();
+        left.into_iter().min_by(|a, b| a.0.mean.total_cmp(&b.0.mean))
     };
     let starts = (0..=last).step_by(step);
-    let (_, near, by) = best_of(&mut starts.flat_map(|from| shifts().map(move |by| (from, by))))?;
+    let (_, near, by) = best_of(starts.flat_map(|from| shifts().map(move |by| (from, by))).collect())?;
     let between = near.saturating_sub(step)..=(near + step).min(last);
-    let (after, from, by) = best_of(&mut between.map(|from| (from, by)))?;
+    let (after, from, by) = best_of(between.map(|from| (from, by)).collect())?;
     let behind =
         |left: &Left| median((from..count).filter(|&i| after.errors[i].is_some()).filter_map(|i| left.errors[i]));
     let (before_mm, after_mm) = (behind(&before)?, behind(&after)?);

@@ -20,7 +20,7 @@ use crate::identify::model::prior::Tolerance;
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::Extra;
 use crate::identify::solve::linearised::Linearised;
-use crate::linear_algebra::{Eliminated, pseudo_inverse};
+use crate::linear_algebra::{Eliminated, solution};
 use crate::robot::Parameter;
 
 /// Cells in all, about.
@@ -268,10 +268,7 @@ impl Fold {
             sds[r] * sds[c] * self.normal[(columns[r], columns[c])] + if r == c { 1.0 } else { 0.0 }
         });
         let rhs = DVector::from_fn(n, |r, _| -sds[r] * self.gradient[columns[r]]);
-        let solved = match Cholesky::new(scaled.clone()) {
-            Some(cholesky) => cholesky.solve(&rhs),
-            None => pseudo_inverse(scaled) * rhs,
-        };
+        let solved = solution(&scaled, &rhs);
         let mut x = DVector::zeros(self.gradient.len());
         for (k, &c) in columns.iter().enumerate() {
             x[c] = sds[k] * solved[k];

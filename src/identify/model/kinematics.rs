@@ -5,10 +5,16 @@
 //! so that a fit can end on its own.
 
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::robot::bent::{Bent, Torques};
 use crate::robot::jacobian::{Feature, Links, Screws, Turn, feature};
+use crate::robot::lanes::{Frames, LANES, Lane, Turns};
 use crate::robot::{Joint, Parameter, Robot};
+use crate::widest::widest;
+
+/// Poses that are worth a thread of their own: some tenths of a millisecond with derivatives.
+const SHARED_POSES: usize = 128;
 
 /// A robot at fixed commanded poses with chosen parameters free.
 #[derive(Debug, Clone)]
@@ -20,10 +26,12 @@ pub struct Kinematics {
     /// Places among the parameters of those that act otherwise at each pose, and what they do there.
     acts: Vec<(usize, Act)>,
     poses: Vec<PoseConstants>,
+    /// The same poses, several side by side; the last one fills them up.
+    lanes: Vec<LaneConstants>,
 }
 
 /// What a correction does at a pose, to which joint.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Act {
     Tilts(usize),
     Turns(usize),
@@ -46,6 +54,22 @@ struct PoseConstants {
     tilts_rad: Vec<[f64; 2]>,
     /// One a parameter.
     features: Vec<Feature>,
+}
+
+/// What [`PoseConstants`] are, of several poses.
+#[derive(Debug, Clone)]
+struct LaneConstants {
+    joints: Vec<JointLanes>,
+    /// One an entry of [`Kinematics::acts`].
+    features: Vec<[Lane; 2]>,
+}
+
+#[derive(Debug, Clone)]
+struct JointLanes {
+    angle_rad: Lane,
+    turns: Turns,
+    /// By the nominal robot's own terms; `None` where no term tilts the joint.
+    tilt_rad: Option<[Lane; 2]>,
 }
 
 /// Where the target is at one pose, and how that changes.
@@ -81,25 +105,69 @@ impl Kinematics {
                 features: parameters.iter().map(|&p| feature(p, &torques, q)).collect(),
             }
         };
-        let poses = joints_rad.iter().map(constants).collect();
-        let acts = parameters.iter().enumerate().filter_map(|(k, &p)| Act::of(p).map(|act| (k, act))).collect();
-        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, poses }
+        let poses: Vec<PoseConstants> = joints_rad.iter().map(constants).collect();
+        let acts: Vec<_> = parameters.iter().enumerate().filter_map(|(k, &p)| Act::of(p).map(|act| (k, act))).collect();
+        let lanes = poses.chunks(LANES).map(|poses| LaneConstants::new(poses, &acts)).collect();
+        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, poses, lanes }
     }
 
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
         let robot = self.nominal.shifted(&self.parameters, offsets);
         let links = Links::new(&robot.joints);
-        let mut bent = Bent { joints: Vec::new(), joints_rad: Vec::new() };
-        let place = |pose: &PoseConstants| {
-            self.bend(&robot, pose, offsets, &mut bent);
-            if derivatives {
-                return self.with_columns(&robot, &links, pose, &bent);
-            }
-            let (rotation, point_mm) = links.end(&bent, &pose.turns, &robot.tool_mm);
-            Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
+        if !derivatives {
+            return widest(
+                #[inline(always)]
+                || self.ends(&robot, &links, offsets),
+            );
+        }
+        let bent = || Bent { joints: Vec::new(), joints_rad: Vec::new() };
+        let place = |bent: &mut Bent, pose: &PoseConstants| {
+            self.bend(&robot, pose, offsets, bent);
+            self.with_columns(&robot, &links, pose, bent)
         };
-        self.poses.iter().map(place).collect()
+        self.poses.par_iter().with_min_len(SHARED_POSES).map_init(bent, place).collect()
+    }
+
+    /// Every pose without derivatives.
+    #[inline(always)]
+    fn ends(&self, robot: &Robot, links: &Links, offsets: &[f64]) -> Vec<Place> {
+        let mut places = Vec::with_capacity(LANES * self.lanes.len());
+        for lanes in &self.lanes {
+            let mut frames = Frames::base();
+            for (i, ((joint, of_joint), link)) in robot.joints.iter().zip(&lanes.joints).zip(&links.0).enumerate() {
+                let acts = || self.acts.iter().zip(&lanes.features).map(|((k, act), f)| (act, offsets[*k] / 1000.0, f));
+                let mut angle_rad = of_joint.angle_rad;
+                for (_, offset, feature) in acts().filter(|(act, ..)| **act == Act::Turns(i)) {
+                    add(&mut angle_rad, offset, &feature[0]);
+                }
+                let (mut alpha, mut beta) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
+                let standing = [joint.alpha_rad, joint.beta_rad];
+                for (axis, swung) in [&mut alpha, &mut beta].into_iter().enumerate() {
+                    let Some(own) = &of_joint.tilt_rad else {
+                        let (sine, cosine) = link[axis].sin_cos(standing[axis]);
+                        *swung = [[sine; LANES], [cosine; LANES]];
+                        continue;
+                    };
+                    let mut tilted_rad = [standing[axis]; LANES];
+                    add(&mut tilted_rad, 1.0, &own[axis]);
+                    for (_, offset, feature) in acts().filter(|(act, ..)| **act == Act::Tilts(i)) {
+                        add(&mut tilted_rad, offset, &feature[axis]);
+                    }
+                    *swung = Turns::of_one(link[axis]).sin_cos(&tilted_rad);
+                }
+                let (mut turn_rad, mut shift_mm) = ([joint.theta_rad; LANES], [joint.d_mm; LANES]);
+                add(if joint.slides { &mut shift_mm } else { &mut turn_rad }, joint.sign, &angle_rad);
+                let turn = of_joint.turns.sin_cos(&turn_rad);
+                frames.over([&alpha, &beta, &turn], joint.a_mm, &shift_mm);
+            }
+            places.extend((0..LANES).map(|pose| {
+                let (rotation, point_mm) = frames.end(pose, &robot.tool_mm);
+                Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
+            }));
+        }
+        places.truncate(self.poses.len());
+        places
     }
 
     /// The robot as it stands at a pose.
@@ -133,6 +201,81 @@ impl Kinematics {
             rotation: screws.base_from_flange,
             point_columns: columns(&|p, f| screws.point_column(p, f)),
             rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
+        }
+    }
+}
+
+impl LaneConstants {
+    /// Of up to [`LANES`] poses; the last stands for those that are missing.
+    fn new(poses: &[PoseConstants], acts: &[(usize, Act)]) -> LaneConstants {
+        let lane = |of: &dyn Fn(&PoseConstants) -> f64| -> Lane {
+            std::array::from_fn(|l| poses.get(l).or(poses.last()).map_or(0.0, of))
+        };
+        let both = |of: &dyn Fn(&PoseConstants) -> [f64; 2]| [0, 1].map(|axis| lane(&|pose| of(pose)[axis]));
+        let joint = |i: usize| {
+            let tilts = acts.iter().any(|(_, act)| *act == Act::Tilts(i));
+            let own = poses.iter().any(|pose| !pose.tilts_rad.is_empty());
+            let turns: [Option<Turn>; LANES] =
+                std::array::from_fn(|l| poses.get(l).or(poses.last()).map(|pose| pose.turns[i]));
+            JointLanes {
+                angle_rad: lane(&|pose| pose.angles_rad[i]),
+                turns: Turns::new(turns.map(|turn| turn.unwrap_or(Turn::new(0.0)))),
+                tilt_rad: (tilts || own).then(|| both(&|pose| pose.tilts_rad.get(i).copied().unwrap_or_default())),
+            }
+        };
+        LaneConstants {
+            joints: (0..poses.first().map_or(0, |pose| pose.turns.len())).map(joint).collect(),
+            features: acts.iter().map(|&(k, _)| both(&|pose| pose.features[k])).collect(),
+        }
+    }
+}
+
+/// Adds a multiple at each pose.
+#[inline(always)]
+fn add(to: &mut Lane, times: f64, what: &Lane) {
+    for (to, what) in to.iter_mut().zip(what) {
+        *to += times * what;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Swarms and fits see the same robot: with every kind of term, near the nominal robot and far from it.
+    #[test]
+    fn places_with_and_without_derivatives_are_the_same_to_the_bit() {
+        let mut robot = Robot::paper();
+        for (i, joint) in robot.joints.iter_mut().enumerate() {
+            joint.beta_rad = 0.01 * i as f64;
+            joint.sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+        }
+        let mut sliding = robot.clone();
+        sliding.joints[2].slides = true;
+        for robot in [robot, sliding] {
+            let terms = [
+                robot.mdh_parameters(),
+                robot.gravity_parameters(true),
+                robot.bending_parameters(),
+                robot.wobble_parameters(),
+                robot.harmonic_parameters(2),
+            ];
+            let joints: Vec<Vec<f64>> =
+                (0..11).map(|k| (0..6).map(|i| (1.3 * k as f64 + 0.7 * i as f64).sin()).collect()).collect();
+            let joints: Vec<&[f64]> = joints.iter().map(Vec::as_slice).collect();
+            for parameters in [terms[0].clone(), terms.concat()] {
+                // A robot that has the terms itself is tilted before anything is added.
+                let own = robot.shifted(&parameters, &vec![0.3; parameters.len()]);
+                for (nominal, size) in [(&robot, 1.0), (&own, 1.0), (&own, 90.0)] {
+                    let offsets: Vec<f64> = (0..parameters.len()).map(|k| size * (1.9 * k as f64).cos()).collect();
+                    let kinematics = Kinematics::new(nominal, nominal, &parameters, &joints);
+                    let (with, without) = (kinematics.places(&offsets, true), kinematics.places(&offsets, false));
+                    assert_eq!(without.len(), joints.len());
+                    for (with, without) in with.iter().zip(&without) {
+                        assert_eq!((with.point_mm, with.rotation), (without.point_mm, without.rotation));
+                    }
+                }
+            }
         }
     }
 }

@@ -8,6 +8,7 @@
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::distances::Distances;
+use super::normal::Normal;
 use super::pairwise::Pairs;
 use super::points::Points;
 use super::state::State;
@@ -15,7 +16,7 @@ use super::touch::Touch;
 use crate::geometry::Transform;
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::Raw;
-use crate::linear_algebra::{pseudo_inverse, without};
+use crate::linear_algebra::{solution, without};
 
 /// Steps of the inner problem at the most; it is nearly linear and mostly needs two or three.
 const INNER_STEPS: usize = 50;
@@ -130,30 +131,43 @@ impl Block {
         }
     }
 
-    /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
-    pub fn solve(&self, state: &State) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
-        let mut at = self.start(&state.places);
-        let (mut residuals, mut design) = self.inner(state, &at);
-        if self.unknown_count() == 0 {
-            return (at, residuals, design);
+    /// Squares and products of the residuals and of their derivatives with respect to the block's own unknowns.
+    fn normal(&self, state: &State, at: &Unknowns) -> Normal {
+        match (self, at) {
+            (Block::Points(points), Unknowns::Frame(frame)) => points.normal(state, frame),
+            _ => Normal::new(self.inner(state, at)),
         }
+    }
+
+    /// The unknowns at their best.
+    pub(super) fn best(&self, state: &State) -> Unknowns {
+        let mut at = self.start(&state.places);
+        if self.unknown_count() == 0 || matches!(self, Block::Points(points) if points.start_is_best()) {
+            return at;
+        }
+        let mut normal = self.normal(state, &at);
         for _ in 0..INNER_STEPS {
-            let gradient = design.tr_mul(&residuals);
-            let step: DVector<f64> = -(pseudo_inverse(design.tr_mul(&design)) * &gradient);
-            let gain = -gradient.dot(&step);
-            let cost = residuals.norm_squared();
-            if gain.is_nan() || gain <= INNER_GAIN * cost {
+            let step = -solution(&normal.matrix, &normal.gradient);
+            let gain = -normal.gradient.dot(&step);
+            if gain.is_nan() || gain <= INNER_GAIN * normal.cost {
                 break;
             }
             // Halved until the cost falls; where it does not, the place is as good as it gets.
             let moved = (0..8).find_map(|halvings| {
                 let trial = at.moved(&(0.5f64.powi(halvings) * &step));
-                let (r, d) = self.inner(state, &trial);
-                (r.norm_squared() <= cost).then_some((trial, r, d))
+                let there = self.normal(state, &trial);
+                (there.cost <= normal.cost).then_some((trial, there))
             });
             let Some(moved) = moved else { break };
-            (at, residuals, design) = moved;
+            (at, normal) = moved;
         }
+        at
+    }
+
+    /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
+    pub fn solve(&self, state: &State) -> (Unknowns, DVector<f64>, DMatrix<f64>) {
+        let at = self.best(state);
+        let (residuals, design) = self.inner(state, &at);
         (at, residuals, design)
     }
 
@@ -161,7 +175,10 @@ impl Block {
     /// eliminated.
     pub fn evaluate(&self, state: &State, derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         if !derivatives {
-            let (_, residuals, _) = self.solve(state);
+            let residuals = match (self, self.best(state)) {
+                (Block::Points(points), Unknowns::Frame(frame)) => points.left(state, &frame),
+                (_, at) => self.inner(state, &at).0,
+            };
             let rows = residuals.len();
             return (residuals, DMatrix::zeros(rows, 0));
         }
@@ -177,7 +194,7 @@ impl Block {
 
     /// Residuals before whitening, for the estimate of the scatter and for lists of what fits badly; by pose, with the row's weight.
     pub fn raw(&self, state: &State) -> Vec<(usize, f64, Raw)> {
-        match (self, &self.solve(state).0) {
+        match (self, &self.best(state)) {
             (Block::Distances(distances), Unknowns::Anchor(point, zero)) => distances.raw(state, point, *zero),
             (Block::Touch(touch), Unknowns::Sockets(sockets)) => touch.raw(state, sockets),
             (Block::Points(points), Unknowns::Frame(frame)) => points.raw(state, frame),

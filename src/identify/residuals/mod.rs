@@ -2,6 +2,7 @@
 
 pub mod distances;
 pub mod eliminate;
+pub mod normal;
 pub mod pairwise;
 pub mod points;
 pub mod rows;

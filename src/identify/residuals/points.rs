@@ -2,6 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
+use super::normal::Normal;
 use super::smooth::Field;
 use super::state::State;
 use crate::geometry::{
@@ -56,6 +57,20 @@ impl Points {
         fitted_frame(self.spots.iter().map(|s| (at(s), s.point_mm, s.weight * s.weight)))
     }
 
+    /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all directions, of which nothing
+    /// but the transform is unknown.
+    pub(super) fn start_is_best(&self) -> bool {
+        /// Of the whitener: far above its rounding, far below any difference of weights.
+        const ALIKE: f64 = 1e-12;
+        let Some(first) = self.spots.iter().find(|s| s.weight > 0.0) else { return false };
+        let unit = first.whitener[(0, 0)] / first.weight;
+        let is_alike = |s: &Spot| {
+            let alike = Matrix3::from_diagonal_element(unit * s.weight);
+            s.extra.is_empty() && (s.whitener - alike).amax() <= ALIKE * unit
+        };
+        !self.oriented && self.target.is_empty() && self.field.is_none() && self.spots.iter().all(is_alike)
+    }
+
     /// Numbers that were measured with some weight.
     pub fn count(&self) -> usize {
         let of_spot = |s: &Spot| if self.oriented && s.rotation.is_some() { 6 } else { 3 };
@@ -76,49 +91,106 @@ impl Points {
         spot.on_body_mm.map(|part| place.rotation * (flange_from_target * part))
     }
 
-    /// What each spot is off by, mm.
-    fn residuals(&self, state: &State, frame: &Transform) -> Vec<Vector3<f64>> {
-        let flange_from_target = self.turned_target(state.extras);
-        let residual = |spot: &Spot| {
+    /// Of each spot: its place as the transform turns it, and what it is off by, sensor frame, mm.
+    fn turned(&self, state: &State, frame: &Transform) -> impl Iterator<Item = (Vector3<f64>, Vector3<f64>)> {
+        let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(state.extras));
+        self.spots.iter().map(move |spot| {
             let place = &state.places[spot.pose];
             let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
-            let mut residual = frame * (place.point_mm + part) - spot.point_mm;
+            let turned = rotation * (place.point_mm.coords + part);
+            let mut residual = turned + frame.translation.vector - spot.point_mm.coords;
             for (column, e) in spot.extra.column_iter().zip(state.extras) {
                 residual += column * *e;
             }
-            residual
-        };
-        self.spots.iter().map(residual).collect()
+            (turned, residual)
+        })
     }
 
-    pub(super) fn inner(&self, state: &State, frame: &Transform) -> (DVector<f64>, DMatrix<f64>) {
+    fn residuals(&self, state: &State, frame: &Transform) -> Vec<Vector3<f64>> {
+        self.turned(state, frame).map(|(_, residual)| residual).collect()
+    }
+
+    /// Of each spot what its orientation is off by, a rotation vector in the sensor's frame, rad, and its weight, 1/rad; `None` where it has none.
+    fn turns(&self, state: &State, frame: &Transform) -> impl Iterator<Item = Option<(Vector3<f64>, f64)>> {
+        let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(state.extras));
+        self.spots.iter().map(move |spot| {
+            let measured = spot.rotation.as_ref().filter(|_| self.oriented)?;
+            let turn = turn(&(rotation * state.places[spot.pose].rotation), &flange_from_target, measured);
+            Some((turn, spot.weight / state.scatter.rotation_rad))
+        })
+    }
+
+    /// White residuals, before a smooth error is taken off.
+    fn white(&self, state: &State, frame: &Transform) -> DVector<f64> {
         let rows = self.rows_a_spot();
-        let flange_from_target = self.turned_target(state.extras);
-        let mut residuals = DVector::zeros(rows * self.spots.len());
-        let mut design = DMatrix::zeros(rows * self.spots.len(), 6);
-        for (i, (spot, residual)) in self.spots.iter().zip(self.residuals(state, frame)).enumerate() {
-            let (place, row) = (&state.places[spot.pose], rows * i);
-            let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
-            let turned = frame.rotation * (place.point_mm.coords + part);
-            let whiten = spot.whitener;
-            residuals.fixed_rows_mut::<3>(row).copy_from(&(whiten * residual));
-            design.fixed_view_mut::<3, 6>(row, 0).copy_from(&(whiten * rigid_columns(&turned)));
-            if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
-                let weight = spot.weight / state.scatter.rotation_rad;
-                let turn = turn(&(rotation_matrix(frame) * place.rotation), &flange_from_target, measured);
-                residuals.fixed_rows_mut::<3>(row + 3).copy_from(&(weight * turn));
-                design.fixed_view_mut::<3, 3>(row + 3, 0).copy_from(&(weight * Matrix3::identity()));
+        let mut white = DVector::zeros(rows * self.spots.len());
+        let of_spots = self.turned(state, frame).zip(self.turns(state, frame));
+        for (i, (spot, ((_, residual), turn))) in self.spots.iter().zip(of_spots).enumerate() {
+            white.fixed_rows_mut::<3>(rows * i).copy_from(&(spot.whitener * residual));
+            if let Some((turn, weight)) = turn {
+                white.fixed_rows_mut::<3>(rows * i + 3).copy_from(&(weight * turn));
             }
         }
-        if let Some(field) = &self.field {
-            let mut all = DMatrix::zeros(residuals.len(), 7);
-            all.columns_mut(0, 6).copy_from(&design);
-            all.set_column(6, &residuals);
-            field.whiten(&mut all);
-            residuals = all.column(6).into_owned();
-            design = all.remove_column(6);
+        white
+    }
+
+    /// Squares and products of the residuals and of their derivatives with respect to a small motion of the transform, spot by spot.
+    pub(super) fn normal(&self, state: &State, frame: &Transform) -> Normal {
+        if self.field.is_some() {
+            return Normal::new(self.inner(state, frame));
         }
-        (residuals, design)
+        let (mut cost, mut by_turn, mut by_shift) = (0.0, Vector3::zeros(), Vector3::zeros());
+        let (mut turn_turn, mut shift_turn, mut shift_shift) = (Matrix3::zeros(), Matrix3::zeros(), Matrix3::zeros());
+        let of_spots = self.turned(state, frame).zip(self.turns(state, frame));
+        for (spot, ((turned, residual), turn)) in self.spots.iter().zip(of_spots) {
+            let precision = spot.whitener.tr_mul(&spot.whitener);
+            let (pull, swing) = (precision * residual, -turned.cross_matrix());
+            let pull_of_swing = precision * swing;
+            cost += residual.dot(&pull);
+            by_turn += swing.tr_mul(&pull);
+            by_shift += pull;
+            turn_turn += swing.tr_mul(&pull_of_swing);
+            shift_turn += pull_of_swing;
+            shift_shift += precision;
+            if let Some((turn, weight)) = turn {
+                let precision = weight * weight;
+                cost += precision * turn.norm_squared();
+                by_turn += precision * turn;
+                turn_turn += Matrix3::from_diagonal_element(precision);
+            }
+        }
+        let gradient = DVector::from_iterator(6, by_turn.iter().chain(&by_shift).copied());
+        let mut matrix = DMatrix::zeros(6, 6);
+        matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&turn_turn);
+        matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&shift_turn);
+        matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&shift_turn.transpose());
+        matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(&shift_shift);
+        Normal { cost, gradient, matrix }
+    }
+
+    /// White residuals and their derivatives with respect to a small motion of the transform.
+    pub(super) fn inner(&self, state: &State, frame: &Transform) -> (DVector<f64>, DMatrix<f64>) {
+        let rows = self.rows_a_spot();
+        let residuals = self.white(state, frame);
+        let mut design = DMatrix::zeros(residuals.len(), 6);
+        let of_spots = self.turned(state, frame).zip(self.turns(state, frame));
+        for (i, (spot, ((turned, _), turn))) in self.spots.iter().zip(of_spots).enumerate() {
+            design.fixed_view_mut::<3, 6>(rows * i, 0).copy_from(&(spot.whitener * rigid_columns(&turned)));
+            if let Some((_, weight)) = turn {
+                let of_turn = Matrix3::from_diagonal_element(weight);
+                design.fixed_view_mut::<3, 3>(rows * i + 3, 0).copy_from(&of_turn);
+            }
+        }
+        let Some(field) = &self.field else { return (residuals, design) };
+        let mut all = design.insert_column(6, 0.0);
+        all.set_column(6, &residuals);
+        field.whiten(&mut all);
+        (all.column(6).into_owned(), all.remove_column(6))
+    }
+
+    /// White residuals.
+    pub(super) fn left(&self, state: &State, frame: &Transform) -> DVector<f64> {
+        if self.field.is_some() { self.inner(state, frame).0 } else { self.white(state, frame) }
     }
 
     pub(super) fn outer(&self, state: &State, frame: &Transform) -> DMatrix<f64> {
@@ -166,16 +238,11 @@ impl Points {
     }
 
     pub(super) fn raw(&self, state: &State, frame: &Transform) -> Vec<(usize, f64, Raw)> {
-        let flange_from_target = self.turned_target(state.extras);
         let mut list = Vec::new();
         let left = self.residuals(state, frame).into_iter().zip(self.smooth_mm(state, frame));
-        for (spot, (residual, smooth)) in self.spots.iter().zip(left) {
+        for ((spot, (residual, smooth)), turn) in self.spots.iter().zip(left).zip(self.turns(state, frame)) {
             list.push((spot.pose, spot.weight, Raw::Point(residual - smooth, spot.covariance_mm2)));
-            if let (true, Some(measured)) = (self.oriented, &spot.rotation) {
-                let sensor_from_flange = rotation_matrix(frame) * state.places[spot.pose].rotation;
-                let turn = turn(&sensor_from_flange, &flange_from_target, measured);
-                list.push((spot.pose, spot.weight, Raw::Turn(turn)));
-            }
+            list.extend(turn.map(|(turn, _)| (spot.pose, spot.weight, Raw::Turn(turn))));
         }
         list
     }
@@ -192,6 +259,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::transform;
+    use crate::identify::sensor::Scatter;
 
     /// Forty points of a robot along 300 mm, off the line by up to `off_mm`, and as a sensor reads them that stands turned about it.
     fn along(off_mm: f64, sensor_from_base: Transform, start: Transform) -> (Points, Vec<Place>) {
@@ -250,5 +318,39 @@ mod tests {
             points.oriented = true;
             assert_eq!(points.start(&places), elsewhere);
         }
+    }
+
+    #[test]
+    fn the_closed_form_is_the_best_only_where_points_weigh_alike() {
+        let sensor_from_base = transform(Vector3::new(0.4, 0.2, -0.3), Vector3::new(10.0, -70.0, 900.0));
+        let (mut points, mut places) = along(30.0, sensor_from_base, sensor_from_base);
+        for (k, (spot, place)) in points.spots.iter_mut().zip(&mut places).enumerate() {
+            spot.weight = 0.2 + (0.9 * k as f64).sin().abs();
+            spot.whitener = Matrix3::identity() * (7.0 * spot.weight);
+            place.point_mm.x += 0.1 * (1.7 * k as f64).sin();
+        }
+        let scatter = Scatter::of_point(1.0);
+        // The share of the residuals that a small rigid motion could still take away.
+        let left = |points: &Points| {
+            let state = State { places: places.clone(), extras: &[], scatter: &scatter };
+            let (residuals, design) = points.inner(&state, &points.start(&places));
+            let share = (design.clone().qr().q().tr_mul(&residuals)).norm() / residuals.norm();
+            let normal = points.normal(&state, &points.start(&places));
+            let expected = Normal::new((residuals.clone(), design.clone()));
+            assert!((&normal.matrix - &expected.matrix).amax() < 1e-9 * expected.matrix.amax());
+            assert!((normal.cost / expected.cost - 1.0).abs() < 1e-9);
+            share
+        };
+        assert!(points.start_is_best() && left(&points) < 1e-9, "{}", left(&points));
+        let mut unlike = points.clone();
+        unlike.spots[3].whitener[(2, 2)] *= 1.5;
+        assert!(!unlike.start_is_best() && left(&unlike) > 1e-6);
+        let mut oriented = points.clone();
+        oriented.oriented = true;
+        let mut with_unknown = points.clone();
+        with_unknown.spots[0].extra = Matrix3xX::zeros(1);
+        let mut outlier = points.clone();
+        outlier.spots[0].weight *= 2.0;
+        assert!([oriented, with_unknown, outlier].iter().all(|p| !p.start_is_best()));
     }
 }

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector};
+use rayon::prelude::*;
 
 use super::distances::{Distances, Origin};
 use super::eliminate::{Block, Unknowns};
@@ -96,8 +97,12 @@ impl Rows {
     /// White residuals and derivatives with respect to all offsets.
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         let state = self.state(offsets, derivatives);
-        let parts: Vec<(DVector<f64>, DMatrix<f64>)> =
-            self.blocks.iter().map(|b| b.evaluate(&state, derivatives)).collect();
+        let part = |b: &Block| b.evaluate(&state, derivatives);
+        // Costs alone are asked for by swarms, whose particles share the threads.
+        let parts: Vec<(DVector<f64>, DMatrix<f64>)> = match derivatives {
+            true => self.blocks.par_iter().map(part).collect(),
+            false => self.blocks.iter().map(part).collect(),
+        };
         let rows = parts.iter().map(|(residuals, _)| residuals.len()).sum();
         let columns = if derivatives { offsets.len() } else { 0 };
         let (mut residuals, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, columns));
@@ -119,7 +124,7 @@ impl Rows {
     /// The unknowns of every placement at these offsets.
     pub fn unknowns(&self, offsets: &[f64]) -> Vec<Unknowns> {
         let state = self.state(offsets, false);
-        self.blocks.iter().map(|b| b.solve(&state).0).collect()
+        self.blocks.iter().map(|b| b.best(&state)).collect()
     }
 
     /// The variance that stands for one, mm^2: costs are multiplied by it.

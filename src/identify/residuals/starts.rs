@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3, Vector3};
 use crate::geometry::{Transform, fitted_frame, nearest_rotation, rotation_matrix};
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::{Length, Spot};
-use crate::linear_algebra::pseudo_inverse;
+use crate::linear_algebra::{product, solution};
 use crate::statistics::median;
 
 /// Rounds of reweighting a first frame.
@@ -109,7 +109,7 @@ pub(super) fn first_anchor(places: &[Place], lengths: &[Length]) -> Vector3<f64>
         let design = DMatrix::from_fn(n, 4, entry);
         let rhs =
             DVector::from_fn(n, |r, _| weights[r] * (arm(&lengths[r]).norm_squared() - lengths[r].length_mm.powi(2)));
-        let solution = pseudo_inverse(design.tr_mul(&design)) * design.tr_mul(&rhs);
+        let solution = solution(&product(&design, &design), &design.tr_mul(&rhs));
         anchor = mean + solution.fixed_rows::<3>(0);
         let misses: Vec<f64> =
             lengths.iter().map(|l| ((places[l.pose].point_mm.coords - anchor).norm() - l.length_mm).abs()).collect();

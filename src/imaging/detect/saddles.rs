@@ -8,7 +8,7 @@
 use nalgebra::{Point2, Vector2};
 
 use crate::imaging::image::Grey8;
-use crate::imaging::image::wide::widest;
+use crate::widest::widest;
 
 /// Offsets of the ring, px, in order round it: radius about 5.
 const RING: [(isize, isize); 16] = [

@@ -13,7 +13,6 @@ mod limits;
 mod mosaic;
 pub mod pyramid;
 pub mod raster;
-pub mod wide;
 
 pub use clipping::Picture;
 pub use decode::{decode, picture};

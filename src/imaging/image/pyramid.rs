@@ -8,8 +8,8 @@ use std::ops::AddAssign;
 
 use nalgebra::Point2;
 
-use super::wide::widest;
 use super::{Grey, Grey8, Image, Picture};
+use crate::widest::widest;
 
 /// The size of a copy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

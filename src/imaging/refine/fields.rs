@@ -9,9 +9,9 @@
 
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
-use crate::imaging::image::wide::widest;
 use crate::imaging::image::{Grey, Image, Picture};
 use crate::imaging::lattice::Places;
+use crate::widest::widest;
 
 /// Corners whose surroundings are looked at.
 const CORNERS: usize = 60;

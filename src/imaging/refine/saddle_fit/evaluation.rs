@@ -8,7 +8,7 @@ use super::crossing::Crossing;
 use super::model::{COLUMNS, Edge, Light, Model, N};
 use super::products::Products;
 use super::window::{Group, Groups, LANES, Lanes, Window};
-use crate::imaging::image::wide::widest;
+use crate::widest::widest;
 
 /// What the derivatives along an arm are made of: see [`along`].
 const ARM: usize = 8;

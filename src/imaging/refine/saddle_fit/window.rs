@@ -9,7 +9,7 @@ use std::ops::Range;
 use nalgebra::{Matrix2, Matrix4, Point2, Vector2, Vector4};
 
 use crate::imaging::image::Image;
-use crate::imaging::image::wide::widest;
+use crate::widest::widest;
 
 /// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
 pub const LANES: usize = 32;

@@ -1,11 +1,11 @@
-//! Loops over many pixels with the widest registers that the processor has.
+//! Loops over many numbers with the widest registers that the processor has.
 //!
 //! In: the work, as a closure that is inlined with all that it calls in its loops. Out: its result, the same to the bit on every processor:
-//! the arithmetic is the same, only more pixels are worked on at once. Goes wrong: what is not inlined is slower, not different.
+//! the arithmetic is the same, only more numbers are worked on at once. Goes wrong: what is not inlined is slower, not different.
 
 /// Does the work.
 #[inline(always)]
-pub fn widest<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn widest<R>(work: impl FnOnce() -> R) -> R {
     #[cfg(target_arch = "x86_64")]
     {
         if is_x86_feature_detected!("avx512f")

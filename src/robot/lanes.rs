@@ -1,0 +1,98 @@
+//! Where the target is at many poses, eight of them at a time, for what asks for no derivatives: a swarm takes millions of poses.
+//!
+//! In: sines and cosines of the joints at eight poses, their ways. Out: the flange's rotation and the target's point at each, base frame, the same
+//! to the bit as [`super::jacobian::Screws`] has them one pose at a time. Poses lie side by side in arrays, which the compiler works on together
+//! (see [`crate::widest`]); what is not inlined there would be slower.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use super::jacobian::Turn;
+
+/// Poses that are computed together.
+pub const LANES: usize = 8;
+
+/// One number at each of the poses.
+pub type Lane = [f64; LANES];
+
+/// Turns at each of the poses with their sines and cosines, from which those of turns near them follow.
+#[derive(Debug, Clone)]
+pub struct Turns {
+    rad: Lane,
+    sine: Lane,
+    cosine: Lane,
+}
+
+impl Turns {
+    /// Of one turn a pose.
+    pub fn new(turns: [Turn; LANES]) -> Turns {
+        Turns { rad: turns.map(|t| t.rad), sine: turns.map(|t| t.sine), cosine: turns.map(|t| t.cosine) }
+    }
+
+    /// Of one turn for all poses.
+    #[inline(always)]
+    pub fn of_one(turn: Turn) -> Turns {
+        Turns { rad: [turn.rad; LANES], sine: [turn.sine; LANES], cosine: [turn.cosine; LANES] }
+    }
+
+    /// Sine and cosine of other turns, rad (see [`Turn::sin_cos`]).
+    #[inline(always)]
+    pub fn sin_cos(&self, rad: &Lane) -> [Lane; 2] {
+        let turn = |l: usize| Turn { rad: self.rad[l], sine: self.sine[l], cosine: self.cosine[l] };
+        let (mut sine, mut cosine) = ([0.0; LANES], [0.0; LANES]);
+        // Asked of all at once: a loop that may call the library's sine is not worked on together.
+        let mut all_near = true;
+        for l in 0..LANES {
+            all_near &= turn(l).is_near(rad[l]);
+        }
+        if all_near {
+            for l in 0..LANES {
+                (sine[l], cosine[l]) = turn(l).near(rad[l]);
+            }
+        } else {
+            for l in 0..LANES {
+                (sine[l], cosine[l]) = turn(l).sin_cos(rad[l]);
+            }
+        }
+        [sine, cosine]
+    }
+}
+
+/// The frames that the chain has reached at each of the poses, base frame.
+pub struct Frames {
+    /// Columns of the rotations, each by its components.
+    columns: [[Lane; 3]; 3],
+    origin_mm: [Lane; 3],
+}
+
+impl Frames {
+    /// The base itself.
+    pub fn base() -> Frames {
+        let column = |axis: usize| std::array::from_fn(|i| [if i == axis { 1.0 } else { 0.0 }; LANES]);
+        Frames { columns: std::array::from_fn(column), origin_mm: [[0.0; LANES]; 3] }
+    }
+
+    /// Goes on over a joint: sine and cosine of alpha, beta and of its turn, its length and its ways, mm.
+    #[inline(always)]
+    pub fn over(&mut self, [alpha, beta, turn]: [&[Lane; 2]; 3], a_mm: f64, shift_mm: &Lane) {
+        let ([sa, ca], [sb, cb], [st, ct]) = (alpha, beta, turn);
+        let [xs, ys, zs] = &mut self.columns;
+        for (((xs, ys), zs), origin) in xs.iter_mut().zip(ys).zip(zs).zip(&mut self.origin_mm) {
+            for l in 0..LANES {
+                let (x, y0, z0) = (xs[l], ys[l], zs[l]);
+                let y = ca[l] * y0 + sa[l] * z0;
+                let z1 = ca[l] * z0 - sa[l] * y0;
+                let x1 = cb[l] * x - sb[l] * z1;
+                let z = sb[l] * x + cb[l] * z1;
+                origin[l] = (origin[l] + a_mm * x) + shift_mm[l] * z;
+                (xs[l], ys[l], zs[l]) = (ct[l] * x1 + st[l] * y, ct[l] * y - st[l] * x1, z);
+            }
+        }
+    }
+
+    /// The rotation and the target's point at one of the poses, with the target at `tool_mm` in the frame, mm.
+    #[inline(always)]
+    pub fn end(&self, pose: usize, tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
+        let rotation = Matrix3::from_fn(|row, column| self.columns[column][row][pose]);
+        (rotation, Point3::from(Vector3::from_fn(|row, _| self.origin_mm[row][pose])) + rotation * tool_mm)
+    }
+}
