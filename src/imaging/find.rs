@@ -78,7 +78,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let seen = folder.in_common_layout(seen, wanted);
     let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
-    let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
+    let Sorted { found, skipped, blind, open } = sort_out(&pairing.pairs, seen, wanted.board);
     if found.len() < wanted.needed {
         return Err(too_few(found.len(), (skipped, total), other));
     }
@@ -90,7 +90,8 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
-    Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
+    let [left_size, right_size] = sizes;
+    Ok(Corners { board: wanted.board, left_size, right_size, pairs, skipped, blind, open, notes })
 }
 
 /// That files hold pictures beside the first, which are not read.

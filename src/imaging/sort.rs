@@ -11,7 +11,7 @@ use super::detect::Refusal;
 use super::input::cache::{Look, Sighting};
 use super::input::pairs::PairFiles;
 use super::lattice::{Lattice, Renumbering};
-use super::{Corner, order};
+use super::{Corner, Side, order};
 
 /// A pair's name and the corners of its left and right picture.
 pub type Found = (String, Lattice<Corner>, Lattice<Corner>);
@@ -49,6 +49,8 @@ pub struct Sorted {
     pub found: Vec<Found>,
     /// The others, with the reason.
     pub skipped: Vec<Skipped>,
+    /// The pictures without the board of pairs that are found by the other picture, with the reason.
+    pub blind: Vec<(Side, Skipped)>,
     /// Those of the skipped ones whose corners could be numbered in several ways.
     pub open: Vec<OpenPair>,
 }
@@ -56,19 +58,22 @@ pub struct Sorted {
 /// What was found in both pictures of a pair, or of a board with markers in one of them.
 pub fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sorted {
     let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
-    let (mut found, mut skipped, mut open) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut found, mut skipped, mut blind, mut open) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (files, looks) in files.iter().zip(seen) {
         let pair = files.pair.clone();
         // Markers number the corners of one picture by itself.
         let is_enough = board.is_coded() && looks.iter().any(Result::is_ok);
         let refused = looks.each_ref().map(|look| look.as_ref().err().map(|refusal| refusal.reason.clone()));
-        if let Some(reason) = of_sides(refused).filter(|_| !is_enough) {
+        if !is_enough && let Some(reason) = of_sides(&refused) {
             skipped.push(Skipped { pair, reason });
             continue;
         }
+        let of_one =
+            |(side, reason): (Side, Option<String>)| Some((side, Skipped { pair: pair.clone(), reason: reason? }));
+        blind.extend(Side::BOTH.into_iter().zip(refused).filter_map(of_one));
         let sides = looks.map(|look| look.unwrap_or_else(|_| Sighting { corners: nothing(), print: None, open: None }));
         let left_open = sides.each_ref().map(|side| side.open.as_ref().map(|open| open.refusal.reason.clone()));
-        if let Some(reason) = of_sides(left_open) {
+        if let Some(reason) = of_sides(&left_open) {
             skipped.push(Skipped { pair: pair.clone(), reason });
             open.push(OpenPair { pair, sides: sides.each_ref().map(numberings), before: found.len() });
         } else {
@@ -76,11 +81,11 @@ pub fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sort
             found.push((pair, left, right));
         }
     }
-    Sorted { found, skipped, open }
+    Sorted { found, skipped, blind, open }
 }
 
 /// What is said of the left picture of a pair and of the right one; `None` where nothing is of either.
-fn of_sides(said: [Option<String>; 2]) -> Option<String> {
+fn of_sides(said: &[Option<String>; 2]) -> Option<String> {
     match said {
         [None, None] => None,
         [Some(left), None] => Some(format!("left picture: {left}")),
@@ -135,6 +140,26 @@ mod tests {
         };
         let seen = [[look(6), look(8)], [look(7), look(8)]];
         assert_eq!(other_board(&seen), "charuco:11x8:15:11:DICT_5X5_100".parse().ok());
+    }
+
+    #[test]
+    fn what_one_picture_of_a_pair_lacks_is_kept_with_the_reason() {
+        let files = PairFiles { pair: "03".to_owned(), left: "l/03.png".into(), right: "r/03.png".into() };
+        let sorted = |name: &str| {
+            let board: Board = name.parse().unwrap();
+            let corner = |col, row| Some(Corner::at(col, row, nalgebra::Point2::new(col as f64, row as f64)));
+            let corners = Lattice::from_fn(board.columns(), board.rows(), corner);
+            let found = Ok(Sighting { corners, print: None, open: None });
+            let refused = Err("shows the board mirrored".to_owned().into());
+            sort_out(std::slice::from_ref(&files), vec![[found, refused]], board)
+        };
+        let coded = sorted("charuco:5x4:20:14:DICT_4X4_50");
+        assert_eq!((coded.found.len(), coded.skipped.len()), (1, 0));
+        let why = Skipped { pair: "03".to_owned(), reason: "shows the board mirrored".to_owned() };
+        assert_eq!(coded.blind, [(Side::Right, why)]);
+        // Of a plain board both pictures are needed: the pair is none.
+        let plain = sorted("checker:5x4:20");
+        assert_eq!((plain.found.len(), plain.skipped.len(), plain.blind.len()), (0, 1, 0));
     }
 
     #[test]
