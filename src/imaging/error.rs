@@ -3,6 +3,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::board::{self, Board, Kind};
+use super::coded::measures::other_size_mm;
 use super::corners::{Skipped, reasons, too_few};
 use crate::diagnostic::Explain;
 
@@ -180,6 +181,9 @@ impl Explain for Error {
                 if 2 * skipped.iter().filter(|s| s.reason.contains(super::image::UNDECODABLE)).count() > skipped.len() =>
             {
                 Some(SAVED_AS.to_owned())
+            }
+            Error::TooFewPairs { other: Some(other), board, .. } if other_size_mm(board, other).is_some() => {
+                Some(format!("`--board {other}` has about the sizes that the pictures show: measure them on the print"))
             }
             Error::TooFewPairs { other: Some(other), .. } if other.is_coded() => {
                 Some(format!("`--board {other}`: the pictures show markers as that board has them"))

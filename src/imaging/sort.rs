@@ -6,12 +6,14 @@
 //! counts as one without a board.
 
 use super::board::{Board, Squares};
+use super::coded::measures;
 use super::corners::{OpenPair, PairCorners, Skipped};
 use super::detect::Refusal;
 use super::input::cache::{Look, Sighting};
 use super::input::pairs::PairFiles;
 use super::lattice::{Lattice, Renumbering};
 use super::{Corner, Side, order};
+use crate::statistics::median;
 
 /// A pair's name and the corners of its left and right picture.
 pub type Found = (String, Lattice<Corner>, Lattice<Corner>);
@@ -34,6 +36,18 @@ pub fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     let shown = |board: &Board| boards.iter().filter(|other| is_of(board, other)).count();
     let board = boards.iter().max_by_key(|board| (shown(board), board.squares.rows))?;
     (2 * shown(board) > refused.len()).then_some(*board)
+}
+
+/// Refusals for another size of the markers or gaps with the size that all of these pictures show together: each measures it a little differently.
+pub fn with_common_sizes(mut seen: Vec<[Look; 2]>, board: &Board) -> Vec<[Look; 2]> {
+    let size_mm = |look: &Look| measures::other_size_mm(board, &look.as_ref().err()?.seen?);
+    let Some(middle_mm) = median(seen.iter().flatten().filter_map(size_mm)) else { return seen };
+    for look in seen.iter_mut().flatten() {
+        if let Some(mm) = size_mm(look).and_then(|mm| measures::common_mm(board, mm, middle_mm)) {
+            *look = Err(measures::refusal(board, mm));
+        }
+    }
+    seen
 }
 
 /// The board that each of some pictures shows instead of the one that is looked for.

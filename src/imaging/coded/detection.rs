@@ -89,8 +89,9 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);
-    if let Some(why) = measures::other_markers(picture, &board, &merged, placement.layout, fields) {
-        return Err(why.into());
+    let as_printed = (placement.layout, placement.inverted);
+    if let Some(refusal) = measures::other_markers(picture, &board, &merged, as_printed, fields) {
+        return Err(refusal);
     }
     let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
     let on_copy = merged.map(|p| level.to_copy(p));

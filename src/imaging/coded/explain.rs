@@ -5,6 +5,7 @@
 
 use super::in_grid::markers_in;
 use super::marker::{Fields, TAG_BORDERS, fields};
+use super::measures;
 use super::numbering::{self, Placement, Read, Said};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
@@ -93,11 +94,8 @@ fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionar
         }
     }
     let reason = match (best, board.kind) {
-        (Some((_, other, share)), Kind::Charuco { marker_mm, .. })
-            if (share - own.share).abs() > 0.03 && other == dictionary =>
-        {
-            let (seen_mm, square_mm) = (share * board.square_mm, board.square_mm);
-            format!("shows markers of about {seen_mm:.3} mm in squares of {square_mm} mm; --board says {marker_mm} mm")
+        (Some((_, other, share)), Kind::Charuco { .. }) if (share - own.share).abs() > 0.03 && other == dictionary => {
+            return measures::refusal(board, share * board.square_mm);
         }
         (Some((_, other, _)), _) if other != dictionary => {
             let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());
