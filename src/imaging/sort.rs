@@ -177,6 +177,25 @@ mod tests {
     }
 
     #[test]
+    fn pictures_that_measure_one_size_a_little_differently_name_one_board() {
+        let asked: Board = "apriltag:6x6:tag36h11:50:10".parse().unwrap();
+        let gap = |mm: f64| Look::Err(measures::refusal(&asked, mm));
+        let none = || Look::Err("no board found".to_owned().into());
+        let seen = vec![[gap(15.01), gap(15.11)], [gap(15.03), none()], [gap(18.2), gap(15.02)]];
+        let seen = with_common_sizes(seen, &asked);
+        let common = Refusal {
+            reason: "shows gaps of about 15 mm between tags of 50 mm; --board says 10 mm".to_owned(),
+            seen: "apriltag:6x6:tag36h11:50:15".parse().ok(),
+        };
+        let is_common = |look: &Look| look.as_ref().is_err_and(|refusal| *refusal == common);
+        assert_eq!(seen.iter().flatten().map(is_common).collect::<Vec<_>>(), [true, true, true, false, false, true]);
+        assert_eq!(other_board(&seen), common.seen);
+        // Two boards in half of the pictures each: neither is the folder's.
+        let two = with_common_sizes(vec![[gap(15.0), gap(12.0)], [gap(15.02), gap(12.01)]], &asked);
+        assert_eq!(other_board(&two), None);
+    }
+
+    #[test]
     fn another_board_is_the_folders_only_where_every_picture_shows_it() {
         let of = |seen: Option<&str>| -> Look {
             let seen = seen.map(|name| name.parse().unwrap());
