@@ -97,23 +97,31 @@ fn other_markers(
     (dictionary, own): (Dictionary, Fields),
     grid: &Places,
 ) -> Option<Refusal> {
-    let mut best: Option<(usize, Dictionary, f64)> = None;
+    let is_other = |share: f64| (share - own.share).abs() > 0.03;
+    let mut best: Option<(usize, Dictionary, Fields, Vec<Read>)> = None;
     for fields in all_fields(board.pitch(), std::iter::once(own.share).chain(SHARES)) {
         let reads = markers_in(picture, grid, board.pitch(), fields);
         for other in Dictionary::all().filter(|other| other.bits() == fields.bits) {
             let known = known_in(other, &reads);
-            if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {
-                best = Some((known, other, fields.share));
+            if known >= FEWEST && 2 * known > reads.len() && best.as_ref().is_none_or(|(most, ..)| known > *most) {
+                best = Some((known, other, fields, reads.clone()));
             }
         }
     }
-    let (_, other, share) = best?;
+    let (_, other, fields, reads) = best?;
     if other != dictionary {
         let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());
         return Some(Refusal { reason, seen: board.with_dictionary(other) });
     }
-    if matches!(board.kind, Kind::Charuco { .. }) && (share - own.share).abs() > 0.03 {
-        return Some(measures::refusal(board, share * board.square_mm));
+    if matches!(board.kind, Kind::Charuco { .. }) && is_other(fields.share) {
+        // Markers are read in squares of several shares that are tried.
+        let whole = |read: &Read| Some((read.col.try_into().ok()?, read.row.try_into().ok()?));
+        let squares: Vec<(usize, usize)> = reads.iter().filter_map(whole).collect();
+        let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
+        let seen = measures::seen_share(picture, grid, (&squares, inverted), fields).unwrap_or(fields.share);
+        if is_other(seen) {
+            return Some(measures::refusal(board, seen * board.square_mm));
+        }
     }
     Some(format!("shows markers of {} in another order than {board} has them", dictionary.said()).into())
 }

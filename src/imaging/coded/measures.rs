@@ -25,12 +25,15 @@ pub fn other_markers(
     picture: &Picture,
     board: &Board,
     merged: &Places,
-    print: (Layout, bool),
+    (layout, inverted): (Layout, bool),
     fields: Fields,
 ) -> Option<Refusal> {
     let Kind::Charuco { .. } = board.kind else { return None };
-    let share = seen_share(picture, merged, print, fields).filter(|s| (s - fields.share).abs() > MOST_OFF)?;
-    Some(refusal(board, share * board.square_mm))
+    let squares = merged.iter().map(|(col, row, _)| (col, row));
+    let marked: Vec<(usize, usize)> =
+        squares.filter(|(col, row)| layout.holds_marker(*col as isize + 1, *row as isize + 1)).collect();
+    let share = seen_share(picture, merged, (&marked, inverted), fields)?;
+    ((share - fields.share).abs() > MOST_OFF).then(|| refusal(board, share * board.square_mm))
 }
 
 /// The board with other gaps between its tags, where measured corners show them to be others than its name says.
@@ -94,9 +97,14 @@ fn seen_gap(corners: &Places) -> Option<(f64, f64)> {
     (gaps.len() > 1).then(|| (middle, 1.253 * spread / (gaps.len() as f64).sqrt()))
 }
 
-/// Side of the markers as they are seen, as a share of a square: where it is steepest from the paper into their border. `None` where no whole square with
-/// a marker is seen well enough, and where that is at an end of what is looked at.
-fn seen_share(picture: &Picture, corners: &Places, (layout, inverted): (Layout, bool), fields: Fields) -> Option<f64> {
+/// Side of the markers in these squares, each the one after such a corner, as a share of a square: where it is steepest from the paper into their border.
+/// `None` where none of them is seen whole and well enough, and where that is at an end of what is looked at.
+pub fn seen_share(
+    picture: &Picture,
+    corners: &Places,
+    (squares, inverted): (&[(usize, usize)], bool),
+    fields: Fields,
+) -> Option<f64> {
     /// Least side of a bit, px.
     const LEAST_FIELD_PX: f64 = 3.0;
     /// Places from a square's side to its middle, a step apart, in sides of the square: those where markers of 0.95 to 0.3 of it begin have as many on
@@ -111,11 +119,8 @@ fn seen_share(picture: &Picture, corners: &Places, (layout, inverted): (Layout, 
     if corners.step_px()? * field < LEAST_FIELD_PX {
         return None;
     }
-    let maps: Vec<_> = corners
-        .iter()
-        .filter(|(col, row, _)| layout.holds_marker(*col as isize + 1, *row as isize + 1))
-        .filter_map(|(col, row, _)| square_map(&corners.square(col, row)?.map(|p| *p)))
-        .collect();
+    let map = |(col, row): &(usize, usize)| square_map(&corners.square(*col, *row)?.map(|p| *p));
+    let maps: Vec<_> = squares.iter().filter_map(map).collect();
     let grey = |step: usize| {
         let depth = STEP * step as f64;
         let mut sum = 0.0;
