@@ -127,7 +127,9 @@ pub struct Corners {
     /// Pairs in which the board was found in both pictures, sorted by name.
     pub pairs: Vec<PairCorners>,
     pub skipped: Vec<Skipped>,
-    /// Those of them that could be if it were known which of the board's corners they show.
+    /// Pictures without a corner in pairs that are used for what the other picture shows, with the reason.
+    pub blind: Vec<(Side, Skipped)>,
+    /// Those of the skipped ones that could be if it were known which of the board's corners they show.
     pub open: Vec<OpenPair>,
     /// What a person should know beside that: files left out, a size that was guessed, another board that was seen.
     pub notes: Vec<String>,

@@ -3,6 +3,8 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::board::{self, Board, Kind};
+use super::coded::measures::other_size_mm;
+use super::coded::{HAS_MARKERS, HAS_TAGS};
 use super::corners::{Skipped, reasons, too_few};
 use crate::diagnostic::Explain;
 
@@ -176,55 +178,83 @@ impl Explain for Error {
                 let none = if counts.is_empty() { "; grids of circles are not read" } else { "" };
                 Some(format!("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`{none}"))
             }
-            Error::TooFewPairs { skipped, .. }
-                if 2 * skipped.iter().filter(|s| s.reason.contains(super::image::UNDECODABLE)).count() > skipped.len() =>
-            {
-                Some(SAVED_AS.to_owned())
-            }
-            Error::TooFewPairs { other: Some(other), .. } if other.is_coded() => {
-                Some(format!("`--board {other}`: the pictures show markers as that board has them"))
-            }
-            Error::TooFewPairs { other: Some(other), .. } => {
-                let (squares, columns, rows) = (other.squares, other.columns(), other.rows());
-                Some(format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners"))
-            }
-            // The board is the right one: most pairs show it.
-            Error::TooFewPairs { found, total, needed, .. } if *found > 0 && 2 * found >= *total => {
-                // Where a rig or its lenses are known, a few pairs do.
-                let sure = if *needed < 4 { "" } else { ", twelve make a sure rig" };
-                Some(format!("photograph the board in more places: {needed} pairs are the least{sure}"))
-            }
-            Error::TooFewPairs { board, .. } if board.is_coded() => {
-                let named = match board.kind {
-                    Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
-                    _ => "columns x rows, square and marker in mm, dictionary",
-                };
-                let plain = "one without markers is named `--squares CxR --square-mm MM`";
-                Some(format!("`--board {board}` must be the board as printed: {named}; {plain}"))
-            }
-            Error::TooFewPairs { skipped, .. } if let Some(dictionary) = markers(skipped) => Some(format!(
-                "name it: `--board charuco:COLUMNSxROWS:SQUARE:MARKER:{dictionary}`, counts in squares as printed, sizes in mm"
-            )),
-            Error::TooFewPairs { board, .. } => {
-                let (columns, rows) = (board.columns(), board.rows());
-                Some(format!(
-                    "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners; a board with markers is named by `--board`",
-                    board.squares
-                ))
+            Error::TooFewPairs { found, total, needed, board, skipped, other, .. } => {
+                Some(of_too_few([*found, *total, *needed], board, skipped, other.as_deref()))
             }
         }
     }
 }
 
-/// The dictionary of the markers that pictures show in which a plain board was looked for; the one in most of them.
-fn markers(skipped: &[Skipped]) -> Option<String> {
+/// What to do where a board was not found in enough pairs.
+fn of_too_few([found, total, needed]: [usize; 3], board: &Board, skipped: &[Skipped], other: Option<&Board>) -> String {
+    let is_undecodable = |s: &&Skipped| s.reason.contains(super::image::UNDECODABLE);
+    if 2 * skipped.iter().filter(is_undecodable).count() > skipped.len() {
+        return SAVED_AS.to_owned();
+    }
+    match other {
+        Some(other) if other_size_mm(board, other).is_some() => {
+            format!("`--board {other}` has about the sizes that the pictures show: measure them on the print")
+        }
+        Some(other) if other.is_coded() => {
+            format!("`--board {other}`: the pictures show markers as that board has them")
+        }
+        Some(other) => {
+            let (squares, columns, rows) = (other.squares, other.columns(), other.rows());
+            format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners")
+        }
+        // The board is the right one: most pairs show it.
+        None if found > 0 && 2 * found >= total => {
+            // Where a rig or its lenses are known, a few pairs do.
+            let sure = if needed < 4 { "" } else { ", twelve make a sure rig" };
+            format!("photograph the board in more places: {needed} pairs are the least{sure}")
+        }
+        None => of_kind_seen(board, skipped).unwrap_or_else(|| as_printed(board)),
+    }
+}
+
+/// How the board is named that nothing was found of.
+fn as_printed(board: &Board) -> String {
+    if board.is_coded() {
+        let named = match board.kind {
+            Kind::Tags { .. } => "columns x rows of tags, family, tag and gap in mm",
+            _ => "columns x rows, square and marker in mm, dictionary",
+        };
+        let plain = "one without markers is named `--squares CxR --square-mm MM`";
+        return format!("`--board {board}` must be the board as printed: {named}; {plain}");
+    }
+    let (columns, rows) = (board.columns(), board.rows());
+    format!(
+        "`--squares` counts squares, not inner corners: {} means {columns}x{rows} inner corners; a board with markers is named by `--board`",
+        board.squares
+    )
+}
+
+/// How a board is named of another kind than was looked for, whose markers or tags pictures show. One that has markers itself may stand among others: most
+/// pictures are to show them then.
+fn of_kind_seen(board: &Board, skipped: &[Skipped]) -> Option<String> {
+    let [markers, tags] = [HAS_MARKERS, HAS_TAGS].map(|begins| named(skipped, begins));
+    let is_tags = tags.as_ref().map(|(count, _)| *count) > markers.as_ref().map(|(count, _)| *count);
+    let most = if is_tags { tags } else { markers };
+    let (_, name) = most.filter(|(count, _)| !board.is_coded() || 2 * count > skipped.len())?;
+    Some(match is_tags {
+        true => {
+            format!("name it: `--board apriltag:COLUMNSxROWS:{name}:TAG:GAP`, counts in tags as printed, sizes in mm")
+        }
+        false => format!(
+            "name it: `--board charuco:COLUMNSxROWS:SQUARE:MARKER:{name}`, counts in squares as printed, sizes in mm"
+        ),
+    })
+}
+
+/// What most reasons name that say so, and how many do.
+fn named(skipped: &[Skipped], says: &str) -> Option<(usize, String)> {
     let said = |skipped: &Skipped| {
-        let (_, after) = skipped.reason.split_once(super::coded::HAS_MARKERS)?;
-        Some(after.split_whitespace().next()?.to_owned())
+        let (_, after) = skipped.reason.split_once(says)?;
+        Some(after.split([' ', ';']).next()?.to_owned())
     };
     let all: Vec<String> = skipped.iter().filter_map(said).collect();
     let count = |one: &str| all.iter().filter(|other| *other == one).count();
-    all.iter().max_by_key(|one| count(one)).cloned()
+    all.iter().map(|one| (count(one), one.clone())).max_by_key(|(count, _)| *count)
 }
 
 #[cfg(test)]
@@ -245,5 +275,46 @@ mod tests {
             assert!(hint(2, 9, board).contains("--squares") || hint(2, 9, board).contains("--board"));
             assert!(hint(0, 0, board).contains("--squares") || hint(0, 0, board).contains("--board"));
         }
+    }
+    /// The hint where none of some pairs shows a board, for these reasons.
+    fn hint_for(board: &str, reasons: &[&str], other: Option<&str>) -> String {
+        let board = Box::new(board.parse().unwrap());
+        let other = other.map(|other| Box::new(other.parse().unwrap()));
+        let one = |reason: &&str| Skipped { pair: "1".to_owned(), reason: format!("both pictures: {reason}") };
+        let skipped: Vec<Skipped> = reasons.iter().map(one).collect();
+        let (total, path) = (skipped.len(), "pictures".into());
+        Error::TooFewPairs { found: 0, total, not_searched: 0, needed: 4, board, path, skipped, other }.hint().unwrap()
+    }
+
+    #[test]
+    fn a_board_of_another_kind_is_named_as_far_as_it_is_read() {
+        let markers = format!("{HAS_MARKERS}DICT_APRILTAG_36h11 in its squares");
+        let tags = format!("{HAS_TAGS}tag25h9");
+        let (markers, tags, none) = (markers.as_str(), tags.as_str(), "no board found");
+        let (plain, charuco, grid) =
+            ("checker:9x7:20", "charuco:5x4:30:22:DICT_4X4_50", "apriltag:5x4:tag36h11:24:7.2");
+        for (board, reasons, hint) in [
+            (plain, [markers, none, none], "`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_APRILTAG_36h11`"),
+            (plain, [tags, markers, tags], "`--board apriltag:COLUMNSxROWS:tag25h9:TAG:GAP`"),
+            (charuco, [tags, tags, none], "`--board apriltag:COLUMNSxROWS:tag25h9:TAG:GAP`"),
+            (grid, [markers, none, markers], "`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_APRILTAG_36h11`"),
+            // Something else beside a board that is not read.
+            (charuco, [tags, none, none], "must be the board as printed"),
+            (plain, [none, none, none], "counts squares, not inner corners"),
+        ] {
+            let said = hint_for(board, &reasons, None);
+            assert!(said.contains(hint), "{board} {reasons:?}: {said}");
+        }
+        // As names of boards are read.
+        assert!("charuco:5x4:30:22:DICT_APRILTAG_36h11".parse::<Board>().is_ok());
+    }
+
+    #[test]
+    fn a_size_that_is_seen_is_to_be_measured() {
+        let board = "charuco:5x4:30:22:DICT_4X4_50";
+        let said = hint_for(board, &["another"], Some("charuco:5x4:30:18.4:DICT_4X4_50"));
+        assert!(said.starts_with("`--board charuco:5x4:30:18.4:DICT_4X4_50`") && said.contains("measure"), "{said}");
+        let said = hint_for(board, &["another"], Some("charuco:6x4:30:22:DICT_4X4_50"));
+        assert!(said.starts_with("`--board charuco:6x4:30:22:DICT_4X4_50`") && !said.contains("measure"), "{said}");
     }
 }

@@ -19,7 +19,7 @@ use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::Lattice;
 use super::refine::fields;
 use super::shown::{printed, unseen_lines};
-use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out};
+use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, overlay, refine};
 use crate::diagnostic::count;
 use crate::files::OutDir;
@@ -51,7 +51,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     let sizes = majority_sizes(&headers);
     let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
     let folder = Folder { files: &pairing.pairs, headers: &headers, sizes };
-    let look_at = |indices: &[usize]| folder.look_at_pairs(indices, (wanted, &bar));
+    let look_at = |indices: &[usize]| with_common_sizes(folder.look_at_pairs(indices, (wanted, &bar)), &wanted.board);
     let total = pairing.pairs.len();
     let too_few = |found: usize, (skipped, searched): (Vec<Skipped>, usize), other: Option<Board>| Error::TooFewPairs {
         found,
@@ -75,10 +75,10 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     seen.sort_by_key(|&(i, _)| i);
     bar.finish_and_clear();
     let seen = seen.into_iter().map(|(_, looks)| looks).collect();
-    let seen = folder.in_common_layout(seen, wanted);
+    let seen = with_common_sizes(folder.in_common_layout(seen, wanted), &wanted.board);
     let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
-    let Sorted { found, skipped, open } = sort_out(&pairing.pairs, seen, wanted.board);
+    let Sorted { found, skipped, blind, open } = sort_out(&pairing.pairs, seen, wanted.board);
     if found.len() < wanted.needed {
         return Err(too_few(found.len(), (skipped, total), other));
     }
@@ -90,7 +90,8 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
-    Ok(Corners { board: wanted.board, left_size: sizes[0], right_size: sizes[1], pairs, skipped, open, notes })
+    let [left_size, right_size] = sizes;
+    Ok(Corners { board: wanted.board, left_size, right_size, pairs, skipped, blind, open, notes })
 }
 
 /// That files hold pictures beside the first, which are not read.
@@ -268,8 +269,8 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
     }
     let mut corners = refine::refine(picture, detected);
     let measured = corners.filter_map(|_, _, corner| corner.used.then_some(corner.px));
-    if let Some(why) = coded::measures::other_gaps(&board, &measured) {
-        return Err(why.into());
+    if let Some(refusal) = coded::measures::other_gaps(&board, &measured) {
+        return Err(refusal);
     }
     if let Some(open) = detected.open.as_ref().filter(|_| !is_measured(&corners)) {
         return Err(open.refusal.clone());

@@ -6,12 +6,14 @@
 //! counts as one without a board.
 
 use super::board::{Board, Squares};
+use super::coded::measures;
 use super::corners::{OpenPair, PairCorners, Skipped};
 use super::detect::Refusal;
 use super::input::cache::{Look, Sighting};
 use super::input::pairs::PairFiles;
 use super::lattice::{Lattice, Renumbering};
-use super::{Corner, order};
+use super::{Corner, Side, order};
+use crate::statistics::median;
 
 /// A pair's name and the corners of its left and right picture.
 pub type Found = (String, Lattice<Corner>, Lattice<Corner>);
@@ -36,6 +38,18 @@ pub fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     (2 * shown(board) > refused.len()).then_some(*board)
 }
 
+/// Refusals for another size of the markers or gaps with the size that all of these pictures show together: each measures it a little differently.
+pub fn with_common_sizes(mut seen: Vec<[Look; 2]>, board: &Board) -> Vec<[Look; 2]> {
+    let size_mm = |look: &Look| measures::other_size_mm(board, &look.as_ref().err()?.seen?);
+    let Some(middle_mm) = median(seen.iter().flatten().filter_map(size_mm)) else { return seen };
+    for look in seen.iter_mut().flatten() {
+        if let Some(mm) = size_mm(look).and_then(|mm| measures::common_mm(board, mm, middle_mm)) {
+            *look = Err(measures::refusal(board, mm));
+        }
+    }
+    seen
+}
+
 /// The board that each of some pictures shows instead of the one that is looked for.
 pub fn shown_by_all<'a>(seen: impl Iterator<Item = &'a [Look; 2]>) -> Option<Board> {
     let mut others = seen.flatten().map(|look| look.as_ref().err().and_then(|refusal| refusal.seen));
@@ -49,6 +63,8 @@ pub struct Sorted {
     pub found: Vec<Found>,
     /// The others, with the reason.
     pub skipped: Vec<Skipped>,
+    /// The pictures without the board of pairs that are found by the other picture, with the reason.
+    pub blind: Vec<(Side, Skipped)>,
     /// Those of the skipped ones whose corners could be numbered in several ways.
     pub open: Vec<OpenPair>,
 }
@@ -56,19 +72,22 @@ pub struct Sorted {
 /// What was found in both pictures of a pair, or of a board with markers in one of them.
 pub fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sorted {
     let nothing = || Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
-    let (mut found, mut skipped, mut open) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut found, mut skipped, mut blind, mut open) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (files, looks) in files.iter().zip(seen) {
         let pair = files.pair.clone();
         // Markers number the corners of one picture by itself.
         let is_enough = board.is_coded() && looks.iter().any(Result::is_ok);
         let refused = looks.each_ref().map(|look| look.as_ref().err().map(|refusal| refusal.reason.clone()));
-        if let Some(reason) = of_sides(refused).filter(|_| !is_enough) {
+        if !is_enough && let Some(reason) = of_sides(&refused) {
             skipped.push(Skipped { pair, reason });
             continue;
         }
+        let of_one =
+            |(side, reason): (Side, Option<String>)| Some((side, Skipped { pair: pair.clone(), reason: reason? }));
+        blind.extend(Side::BOTH.into_iter().zip(refused).filter_map(of_one));
         let sides = looks.map(|look| look.unwrap_or_else(|_| Sighting { corners: nothing(), print: None, open: None }));
         let left_open = sides.each_ref().map(|side| side.open.as_ref().map(|open| open.refusal.reason.clone()));
-        if let Some(reason) = of_sides(left_open) {
+        if let Some(reason) = of_sides(&left_open) {
             skipped.push(Skipped { pair: pair.clone(), reason });
             open.push(OpenPair { pair, sides: sides.each_ref().map(numberings), before: found.len() });
         } else {
@@ -76,11 +95,11 @@ pub fn sort_out(files: &[PairFiles], seen: Vec<[Look; 2]>, board: Board) -> Sort
             found.push((pair, left, right));
         }
     }
-    Sorted { found, skipped, open }
+    Sorted { found, skipped, blind, open }
 }
 
 /// What is said of the left picture of a pair and of the right one; `None` where nothing is of either.
-fn of_sides(said: [Option<String>; 2]) -> Option<String> {
+fn of_sides(said: &[Option<String>; 2]) -> Option<String> {
     match said {
         [None, None] => None,
         [Some(left), None] => Some(format!("left picture: {left}")),
@@ -135,6 +154,45 @@ mod tests {
         };
         let seen = [[look(6), look(8)], [look(7), look(8)]];
         assert_eq!(other_board(&seen), "charuco:11x8:15:11:DICT_5X5_100".parse().ok());
+    }
+
+    #[test]
+    fn what_one_picture_of_a_pair_lacks_is_kept_with_the_reason() {
+        let files = PairFiles { pair: "03".to_owned(), left: "l/03.png".into(), right: "r/03.png".into() };
+        let sorted = |name: &str| {
+            let board: Board = name.parse().unwrap();
+            let corner = |col, row| Some(Corner::at(col, row, nalgebra::Point2::new(col as f64, row as f64)));
+            let corners = Lattice::from_fn(board.columns(), board.rows(), corner);
+            let found = Ok(Sighting { corners, print: None, open: None });
+            let refused = Err("shows the board mirrored".to_owned().into());
+            sort_out(std::slice::from_ref(&files), vec![[found, refused]], board)
+        };
+        let coded = sorted("charuco:5x4:20:14:DICT_4X4_50");
+        assert_eq!((coded.found.len(), coded.skipped.len()), (1, 0));
+        let why = Skipped { pair: "03".to_owned(), reason: "shows the board mirrored".to_owned() };
+        assert_eq!(coded.blind, [(Side::Right, why)]);
+        // Of a plain board both pictures are needed: the pair is none.
+        let plain = sorted("checker:5x4:20");
+        assert_eq!((plain.found.len(), plain.skipped.len(), plain.blind.len()), (0, 1, 0));
+    }
+
+    #[test]
+    fn pictures_that_measure_one_size_a_little_differently_name_one_board() {
+        let asked: Board = "apriltag:6x6:tag36h11:50:10".parse().unwrap();
+        let gap = |mm: f64| Look::Err(measures::refusal(&asked, mm));
+        let none = || Look::Err("no board found".to_owned().into());
+        let seen = vec![[gap(15.01), gap(15.11)], [gap(15.03), none()], [gap(18.2), gap(15.02)]];
+        let seen = with_common_sizes(seen, &asked);
+        let common = Refusal {
+            reason: "shows gaps of about 15 mm between tags of 50 mm; --board says 10 mm".to_owned(),
+            seen: "apriltag:6x6:tag36h11:50:15".parse().ok(),
+        };
+        let is_common = |look: &Look| look.as_ref().is_err_and(|refusal| *refusal == common);
+        assert_eq!(seen.iter().flatten().map(is_common).collect::<Vec<_>>(), [true, true, true, false, false, true]);
+        assert_eq!(other_board(&seen), common.seen);
+        // Two boards in half of the pictures each: neither is the folder's.
+        let two = with_common_sizes(vec![[gap(15.0), gap(12.0)], [gap(15.02), gap(12.01)]], &asked);
+        assert_eq!(other_board(&two), None);
     }
 
     #[test]

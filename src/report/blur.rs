@@ -129,8 +129,8 @@ mod tests {
             let pair = PairCorners { pair: "1".to_owned(), left: side(left), right: side(right) };
             let board = "checker:9x7:20".parse().unwrap();
             let (left_size, right_size) = ((100, 50), (100, 50));
-            let (skipped, open, notes) = (Vec::new(), Vec::new(), Vec::new());
-            warning(&Corners { board, left_size, right_size, pairs: vec![pair], skipped, open, notes })
+            let (skipped, blind, open, notes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+            warning(&Corners { board, left_size, right_size, pairs: vec![pair], skipped, blind, open, notes })
         };
         for (left, right) in [(0.7, 0.7), (2.4, 1.4)] {
             assert_eq!(of(left, right), None);

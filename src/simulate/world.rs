@@ -170,6 +170,7 @@ impl World {
             right_size: size,
             pairs: pairs.collect(),
             skipped: Vec::new(),
+            blind: Vec::new(),
             open: Vec::new(),
             notes: Vec::new(),
         }

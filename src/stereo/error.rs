@@ -51,6 +51,16 @@ pub enum Error {
         /// Pairs with a board in one picture at least.
         pairs: usize,
     },
+    /// One of the cameras shows the board in hardly any pair; the other one does.
+    #[error("{} {} pictures show the board, which the {} ones show{}", too_few(*.found, *.total), side.name(), side.other().name(), reasons(.without))]
+    OneSideBlind {
+        side: Side,
+        /// Pairs that this side shows the board in, of how many.
+        found: usize,
+        total: usize,
+        /// The others, and why.
+        without: Vec<Skipped>,
+    },
     /// Pairs that are compared with a rig fit it with their pictures exchanged.
     #[error("left and right pictures are exchanged: each pair fits the calibration the other way round")]
     Exchanged,
@@ -247,6 +257,7 @@ impl Explain for Error {
     fn status(&self) -> Status {
         match self {
             Error::TooFewPairs { .. }
+            | Error::OneSideBlind { .. }
             | Error::OutOfView { .. }
             | Error::Exchanged
             | Error::NoSuchPair { .. }
@@ -271,6 +282,7 @@ impl Explain for Error {
                 Error::NothingInCommon { .. } => {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
+                Error::OneSideBlind { .. } => "both cameras must show one board at once, in pictures as they took them",
                 Error::Exchanged => {
                     "name the left camera's pictures first; if the cameras themselves changed places, calibrate anew"
                 }

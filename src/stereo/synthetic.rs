@@ -179,6 +179,7 @@ impl World {
             right_size: (self.rig.right.width, self.rig.right.height),
             pairs,
             skipped: Vec::new(),
+            blind: Vec::new(),
             open: Vec::new(),
             notes: Vec::new(),
         }

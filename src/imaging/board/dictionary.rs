@@ -42,7 +42,7 @@ impl Dictionary {
     pub fn of_tags(text: &str) -> Result<Dictionary, String> {
         let lower = text.to_ascii_lowercase();
         let size = lower.strip_prefix("tag").or_else(|| lower.strip_prefix('t')).unwrap_or(&lower);
-        let families = || Dictionary::all().filter(|known| known.name().starts_with(TAGS));
+        let families = || Dictionary::all().filter(|known| known.is_of_tags());
         let same = |known: &Dictionary| {
             text.eq_ignore_ascii_case(known.name()) || known.name()[TAGS.len()..].eq_ignore_ascii_case(size)
         };
@@ -57,9 +57,14 @@ impl Dictionary {
         format!("tag{}", self.name().strip_prefix(TAGS).unwrap_or(self.name()).to_ascii_lowercase())
     }
 
+    /// Whether it is a family of AprilTags.
+    pub fn is_of_tags(self) -> bool {
+        self.name().starts_with(TAGS)
+    }
+
     /// Its name for a person: AprilTags by the family's.
     pub fn said(self) -> String {
-        if self.name().starts_with(TAGS) { self.tag_name() } else { self.name().to_owned() }
+        if self.is_of_tags() { self.tag_name() } else { self.name().to_owned() }
     }
 
     /// All that there are.

@@ -145,6 +145,25 @@ impl Board {
         board.check_markers().is_ok().then_some(board)
     }
 
+    /// The side of its markers, or the width of the gaps between its tags, mm.
+    pub fn marked_mm(&self) -> Option<f64> {
+        match self.kind {
+            Kind::Checker => None,
+            Kind::Charuco { marker_mm: mm, .. } | Kind::Tags { gap_mm: mm, .. } => Some(mm),
+        }
+    }
+
+    /// The same board with markers of another side, or with other gaps between its tags, where there can be such a one.
+    pub fn with_marked_mm(self, mm: f64) -> Option<Board> {
+        let kind = match self.kind {
+            Kind::Checker => return None,
+            Kind::Charuco { dictionary, layout, .. } => Kind::Charuco { marker_mm: mm, dictionary, layout },
+            Kind::Tags { family, .. } => Kind::Tags { gap_mm: mm, family },
+        };
+        let board = Board { kind, ..self };
+        board.check_markers().is_ok().then_some(board)
+    }
+
     /// Whether it is this board, or this board with the first markers of its dictionary alone.
     pub fn has_all_of(&self, other: &Board) -> bool {
         self == other

@@ -14,7 +14,7 @@ use super::marker::{Fields, fields};
 use super::numbering::{Placement, Said};
 use super::{explain, faint, local_map, measures, numbering};
 use crate::imaging::Board;
-use crate::imaging::board::{Pitch, Print};
+use crate::imaging::board::{Kind, Pitch, Print};
 use crate::imaging::detect::{Detected, Refusal, grids, on_a_copy, right_handed};
 use crate::imaging::image::pyramid::{Level, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
@@ -32,20 +32,33 @@ const MOST_GRIDS: usize = 12;
 /// Why a part of a board has no number where the layout alone would give it one.
 pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which corners they are depends on the layout, OpenCV's before or since 4.6";
 
-/// What a picture shows that has a board with markers where a plain one was looked for.
+/// What a picture shows that has a board with markers where one of another kind was looked for.
 pub const HAS_MARKERS: &str = "shows a board with markers of ";
 
-/// Whether a picture in which no plain board was found shows a ChArUco board.
-pub fn with_markers(picture: &Picture) -> Option<String> {
+/// The same for a grid of tags.
+pub const HAS_TAGS: &str = "shows a grid of tags of ";
+
+/// Whether a picture in which nothing of a board was read shows one of another kind with markers or tags.
+pub fn of_other_kind(picture: &Picture, asked: &Board) -> Option<String> {
     /// Copies and grids that are looked at: markers that number a board are on the largest of them.
     const COPIES: usize = 2;
     const GRIDS: usize = 3;
-    /// Most markers leave at least as much of a square free on each side.
+    /// Most markers leave at least as much of a square free on each side, and borders of tags are wider.
     const MARGIN: f64 = 0.1;
-    levels(picture).take(COPIES).find_map(|level| {
-        let mut found = grids_on((level, &level.copy(picture)), Pitch::Even, MARGIN, false).take(GRIDS);
-        let dictionary = found.find_map(|grid| explain::dictionary_in(picture, &grid))?;
-        Some(format!("{HAS_MARKERS}{} in its squares", dictionary.said()))
+    /// What Kalibr prints; grids of other gaps are found as long as they are not far from it.
+    const GAP: f64 = 0.3;
+    let markers = (Pitch::Even, matches!(asked.kind, Kind::Charuco { .. }));
+    let tags = (Pitch::Tags { gap: GAP }, matches!(asked.kind, Kind::Tags { .. }));
+    let others = [markers, tags].into_iter().filter(|(_, is_asked)| !is_asked);
+    others.map(|(pitch, _)| pitch).find_map(|pitch| {
+        let dictionary = levels(picture).take(COPIES).find_map(|level| {
+            let mut found = grids_on((level, &level.copy(picture)), pitch, MARGIN, false).take(GRIDS);
+            found.find_map(|grid| explain::dictionary_in(picture, &grid, pitch))
+        })?;
+        Some(match pitch {
+            Pitch::Even => format!("{HAS_MARKERS}{} in its squares", dictionary.name()),
+            Pitch::Tags { .. } => format!("{HAS_TAGS}{}", dictionary.tag_name()),
+        })
     })
 }
 
@@ -85,12 +98,17 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         if missed.by_layout {
             return Err(BY_LAYOUT.to_owned().into());
         }
-        return Err(explain::unnumbered(picture, &board, &missed.unnumbered));
+        let grids = &missed.unnumbered;
+        let other = || of_other_kind(picture, &board).map(Refusal::from);
+        return Err(explain::unnumbered(picture, &board, grids)
+            .or_else(other)
+            .unwrap_or_else(|| explain::unread(grids)));
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);
-    if let Some(why) = measures::other_markers(picture, &board, &merged, placement.layout, fields) {
-        return Err(why.into());
+    let as_printed = (placement.layout, placement.inverted);
+    if let Some(refusal) = measures::other_markers(picture, &board, &merged, as_printed, fields) {
+        return Err(refusal);
     }
     let print = Print { share: fields.marked(), pitch, layout: placement.layout, inverted: placement.inverted };
     let on_copy = merged.map(|p| level.to_copy(p));

@@ -5,6 +5,7 @@
 
 use super::in_grid::markers_in;
 use super::marker::{Fields, TAG_BORDERS, fields};
+use super::measures;
 use super::numbering::{self, Placement, Read, Said};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
@@ -19,22 +20,18 @@ const SHARES: [f64; 8] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85];
 /// Most columns of a board.
 const MOST_COLUMNS: usize = 40;
 
-/// Why none of these grids is a part of the board.
-pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal {
-    let none = || Refusal::from("no board found".to_owned());
-    let Some(dictionary) = board.kind.dictionary() else { return none() };
-    let largest = grids.iter().max_by_key(|grid| grid.count());
-    let Some(grid) = largest.filter(|grid| grid.count() >= 4) else { return none() };
+/// Why none of these grids is a part of the board, as far as markers of its kind are read in them; `None` where none are.
+pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Option<Refusal> {
+    let dictionary = board.kind.dictionary()?;
+    let grid = largest(grids)?;
     let size = (grid.columns, grid.rows);
     let markers_in = |grid: &Places, fields: Fields| markers_in(picture, grid, board.pitch(), fields);
     let all: Vec<(Fields, Vec<Read>)> = fields(board).into_iter().map(|own| (own, markers_in(grid, own))).collect();
     let by_known = |(_, reads): &(Fields, Vec<Read>)| (known_in(dictionary, reads), reads.len());
-    let Some((own, reads)) = all.into_iter().max_by_key(by_known) else {
-        return none();
-    };
+    let (own, reads) = all.into_iter().max_by_key(by_known)?;
     if let Some(layout) = other_layout(board, size, &reads) {
         let reason = format!("shows the markers in {}; --board says the other", layout.said());
-        return Refusal { reason, seen: Some(board.with_layout(layout)) };
+        return Some(Refusal { reason, seen: Some(board.with_layout(layout)) });
     }
     if let Some(squares) = other_counts(board, size, &reads) {
         let (columns, said) = match board.kind {
@@ -45,31 +42,44 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal
         };
         let reason =
             format!("shows the markers of a board of {columns}; --board says {said} (columns first, as printed)");
-        return Refusal { reason, seen: Some(Board { squares, ..*board }) };
+        return Some(Refusal { reason, seen: Some(Board { squares, ..*board }) });
     }
     if let Said::Place(found) = numbering::place(board, size, &reads) {
         let reason = format!("shows a board larger than {}: its corners go on beyond those", board.said());
         let squares = Squares { rows: rows_seen(&found, size), ..board.squares };
         let is_taller = matches!(board.kind, Kind::Charuco { .. }) && squares.rows > board.squares.rows;
-        return Refusal { reason, seen: is_taller.then_some(Board { squares, ..*board }) };
+        return Some(Refusal { reason, seen: is_taller.then_some(Board { squares, ..*board }) });
     }
     let mirrored = grid.flip_rows();
     let is_mirrored = |own| numbering::place(board, size, &markers_in(&mirrored, own)) != Said::Nothing;
     if fields(board).into_iter().any(is_mirrored) {
-        return "shows the board mirrored: the print or the picture is".to_owned().into();
+        return Some("shows the board mirrored: the print or the picture is".to_owned().into());
     }
     other_markers(picture, board, (dictionary, own), grid)
 }
 
-/// The dictionary of the markers in the squares of a grid, whatever board was asked for: more of them than chance finds.
-pub fn dictionary_in(picture: &Picture, grid: &Places) -> Option<Dictionary> {
+/// What is said of grids in which nothing was read.
+pub fn unread(grids: &[Places]) -> Refusal {
+    let corners =
+        |grid: &Places| format!("shows {} corners of squares, and no marker among them that can be read", grid.count());
+    largest(grids).map_or_else(|| "no board found".to_owned(), corners).into()
+}
+
+/// The largest of some grids; `None` where it is too small for a square.
+fn largest(grids: &[Places]) -> Option<&Places> {
+    grids.iter().max_by_key(|grid| grid.count()).filter(|grid| grid.count() >= 4)
+}
+
+/// The dictionary of the markers in the squares of a grid, or of the tags, whatever board was asked for: more of them than chance finds.
+pub fn dictionary_in(picture: &Picture, grid: &Places, pitch: Pitch) -> Option<Dictionary> {
     /// In the squares of a plain board nothing has a marker's outline; of what lies round it one or two may be read as one.
     const FEWEST_UNASKED: usize = 4;
-    let known = of_markers(SHARES.into_iter()).flat_map(|fields| {
-        let reads = markers_in(picture, grid, Pitch::Even, fields);
+    let known = all_fields(pitch, SHARES.into_iter()).into_iter().flat_map(|fields| {
+        let reads = markers_in(picture, grid, pitch, fields);
         let all = if reads.len() < FEWEST_UNASKED { Vec::new() } else { Dictionary::all().collect() };
         let of = move |dictionary: Dictionary| (known_in(dictionary, &reads), dictionary, reads.len());
-        all.into_iter().filter(move |dictionary| dictionary.bits() == fields.bits).map(of)
+        let is_of = move |dictionary: &Dictionary| pitch == Pitch::Even || dictionary.is_of_tags();
+        all.into_iter().filter(is_of).filter(move |dictionary| dictionary.bits() == fields.bits).map(of)
     });
     // Of two that begin alike the smaller.
     let better = |best: Option<(usize, Dictionary, usize)>, next: (usize, Dictionary, usize)| match best {
@@ -81,45 +91,45 @@ pub fn dictionary_in(picture: &Picture, grid: &Places) -> Option<Dictionary> {
 }
 
 /// What else the markers of a grid are: of another dictionary, of another size, in another order, or none.
-fn other_markers(picture: &Picture, board: &Board, (dictionary, own): (Dictionary, Fields), grid: &Places) -> Refusal {
-    let mut best: Option<(usize, Dictionary, f64)> = None;
-    for fields in other_fields(board, own) {
+fn other_markers(
+    picture: &Picture,
+    board: &Board,
+    (dictionary, own): (Dictionary, Fields),
+    grid: &Places,
+) -> Option<Refusal> {
+    let is_other = |share: f64| (share - own.share).abs() > 0.03;
+    let mut best: Option<(usize, Dictionary, Fields, Vec<Read>)> = None;
+    for fields in all_fields(board.pitch(), std::iter::once(own.share).chain(SHARES)) {
         let reads = markers_in(picture, grid, board.pitch(), fields);
         for other in Dictionary::all().filter(|other| other.bits() == fields.bits) {
             let known = known_in(other, &reads);
-            if known >= FEWEST && 2 * known > reads.len() && best.is_none_or(|(most, ..)| known > most) {
-                best = Some((known, other, fields.share));
+            if known >= FEWEST && 2 * known > reads.len() && best.as_ref().is_none_or(|(most, ..)| known > *most) {
+                best = Some((known, other, fields, reads.clone()));
             }
         }
     }
-    let reason = match (best, board.kind) {
-        (Some((_, other, share)), Kind::Charuco { marker_mm, .. })
-            if (share - own.share).abs() > 0.03 && other == dictionary =>
-        {
-            let (seen_mm, square_mm) = (share * board.square_mm, board.square_mm);
-            format!("shows markers of about {seen_mm:.3} mm in squares of {square_mm} mm; --board says {marker_mm} mm")
+    let (_, other, fields, reads) = best?;
+    if other != dictionary {
+        let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());
+        return Some(Refusal { reason, seen: board.with_dictionary(other) });
+    }
+    if matches!(board.kind, Kind::Charuco { .. }) && is_other(fields.share) {
+        // Markers are read in squares of several shares that are tried.
+        let whole = |read: &Read| Some((read.col.try_into().ok()?, read.row.try_into().ok()?));
+        let squares: Vec<(usize, usize)> = reads.iter().filter_map(whole).collect();
+        let inverted = 2 * reads.iter().filter(|read| read.marker.inverted).count() > reads.len();
+        let seen = measures::seen_share(picture, grid, (&squares, inverted), fields).unwrap_or(fields.share);
+        if is_other(seen) {
+            return Some(measures::refusal(board, seen * board.square_mm));
         }
-        (Some((_, other, _)), _) if other != dictionary => {
-            let reason = format!("shows markers of {}, the board has those of {}", other.said(), dictionary.said());
-            return Refusal { reason, seen: board.with_dictionary(other) };
-        }
-        (Some(_), _) => {
-            format!("shows markers of {} in another order than {board} has them", dictionary.said())
-        }
-        (None, _) => format!("shows {} corners of squares, and no marker among them that can be read", grid.count()),
-    };
-    reason.into()
+    }
+    Some(format!("shows markers of {} in another order than {board} has them", dictionary.said()).into())
 }
 
-/// How markers of such shares of a square may be divided.
-fn of_markers(shares: impl Iterator<Item = f64>) -> impl Iterator<Item = Fields> {
-    shares.flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits)))
-}
-
-/// How the markers of other boards may be divided.
-fn other_fields(board: &Board, own: Fields) -> Vec<Fields> {
-    match board.pitch() {
-        Pitch::Even => of_markers(std::iter::once(own.share).chain(SHARES)).collect(),
+/// How the markers of a board of such a pitch may be divided, those in squares of such shares of them.
+fn all_fields(pitch: Pitch, shares: impl Iterator<Item = f64>) -> Vec<Fields> {
+    match pitch {
+        Pitch::Even => shares.flat_map(|share| (4..=7).map(move |bits| Fields::of_marker(share, bits))).collect(),
         Pitch::Tags { gap } => {
             let borders = TAG_BORDERS.into_iter();
             borders.flat_map(|border| (4..=7).map(move |bits| Fields::of_tag(gap, bits, border))).collect()

@@ -13,4 +13,4 @@ mod numbering;
 #[cfg(test)]
 mod tests;
 
-pub use detection::{BY_LAYOUT, HAS_MARKERS, detect, with_markers};
+pub use detection::{BY_LAYOUT, HAS_MARKERS, HAS_TAGS, detect, of_other_kind};

@@ -3,6 +3,7 @@
 
 use nalgebra::{Point2, Vector3};
 
+use super::{HAS_TAGS, measures, of_other_kind};
 use crate::imaging::Board;
 use crate::imaging::detect::{Refusal, detect};
 use crate::imaging::find::corners_in;
@@ -115,6 +116,39 @@ fn the_board_that_it_is_comes_with_the_reason() {
 }
 
 #[test]
+fn the_size_that_is_printed_is_told_whatever_was_asked_for() {
+    for inverted in [false, true] {
+        let shot = Shot { inverted, ..Shot::of(BOARD, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]) };
+        let (picture, _) = shot.taken();
+        for said_mm in [10.0, 11.0, 12.4, 15.6, 16.5, 18.0] {
+            let asked = BOARD.parse::<Board>().unwrap().with_marked_mm(said_mm).unwrap();
+            let seen = refused(&picture, &asked.to_string()).seen.unwrap();
+            let seen_mm = measures::other_size_mm(&asked, &seen).unwrap();
+            assert!((seen_mm - 14.0).abs() < 0.4, "{inverted} {said_mm}: {seen_mm}");
+        }
+        // By so much markers bleed and printers stretch.
+        assert!(corners_in(&picture, BOARD.replace(":14:", ":14.5:").parse().unwrap()).is_ok());
+    }
+    let (picture, _) = Shot::of(TAGS, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+    for said in ["6", "8.4"] {
+        let asked: Board = TAGS.replace(":7.2", &format!(":{said}")).parse().unwrap();
+        let seen_mm = measures::other_size_mm(&asked, &refused(&picture, &asked.to_string()).seen.unwrap()).unwrap();
+        assert!((seen_mm - 7.2).abs() < 0.15, "{said}: {seen_mm}");
+    }
+}
+
+#[test]
+fn a_grid_of_tags_is_told_whatever_its_gaps_are() {
+    let plain: Board = "checker:20x20:10".parse().unwrap();
+    for (board, family) in
+        [(TAGS, Some("tag36h11")), ("apriltag:4x3:tag25h9:30:7.5", Some("tag25h9")), ("checker:9x7:20", None)]
+    {
+        let (picture, _) = Shot::of(board, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+        assert_eq!(of_other_kind(&picture, &plain), family.map(|family| format!("{HAS_TAGS}{family}")), "{board}");
+    }
+}
+
+#[test]
 fn another_board_is_named() {
     let plain = "checker:9x7:20";
     let others = [
@@ -124,16 +158,18 @@ fn another_board_is_named() {
         (BOARD, "charuco:9x6:20:14:DICT_5X5_100", "larger than 9x6"),
         (BOARD, "charuco:9x7:20:11:DICT_5X5_100", "markers of"),
         (BOARD, "charuco:9x7:20:17:DICT_5X5_100", "markers of"),
+        (BOARD, TAGS, "board with markers of DICT_5X5_"),
         (TAGS, "apriltag:5x4:tag25h9:24:7.2", "markers of tag36h11"),
         (TAGS, "apriltag:4x4:tag36h11:24:7.2", "board of 5 columns"),
         (TAGS, "apriltag:6x4:tag36h11:24:7.2", "board of 5 columns"),
         (TAGS, "apriltag:5x3:tag36h11:24:7.2", "larger than 5x3"),
-        (TAGS, "apriltag:5x4:tag36h11:24:6", "gaps of 7."),
-        (TAGS, "apriltag:5x4:tag36h11:24:8.4", "gaps of 7."),
-        (TAGS, "apriltag:5x4:tag36h11:24:7.35", "gaps of 7.2"),
-        (TAGS, "apriltag:5x4:tag36h11:24:7.05", "gaps of 7."),
-        (TAGS, BOARD, "no marker"),
+        (TAGS, "apriltag:5x4:tag36h11:24:6", "gaps of about 7."),
+        (TAGS, "apriltag:5x4:tag36h11:24:8.4", "gaps of about 7."),
+        (TAGS, "apriltag:5x4:tag36h11:24:7.35", "gaps of about 7.2"),
+        (TAGS, "apriltag:5x4:tag36h11:24:7.05", "gaps of about 7."),
+        (TAGS, BOARD, "grid of tags of tag36h11"),
         (plain, BOARD, "no marker"),
+        (plain, TAGS, "no "),
     ];
     for others in others.chunk_by(|a, b| a.0 == b.0) {
         let shown = others[0].0;

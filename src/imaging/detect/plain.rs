@@ -71,7 +71,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     if board.is_coded() {
         return coded::detect(picture, board);
     }
-    detect_plain(picture, board).map_err(|refusal| coded::with_markers(picture).map_or(refusal, Refusal::from))
+    detect_plain(picture, board).map_err(|refusal| coded::of_other_kind(picture, &board).map_or(refusal, Refusal::from))
 }
 
 fn detect_plain(picture: &Picture, board: Board) -> Result<Detected, Refusal> {

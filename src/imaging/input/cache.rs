@@ -9,7 +9,7 @@ use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
 
 use crate::files::OutDir;
-use crate::imaging::board::{Kind, Layout, Print};
+use crate::imaging::board::{Layout, Print};
 use crate::imaging::detect::{Open, Refusal};
 use crate::imaging::image::Grey8;
 use crate::imaging::image::pyramid::{Level, Small};
@@ -165,14 +165,12 @@ fn parse(text: &str, board: Board) -> Option<Look> {
 fn parse_seen(seen: Option<String>, board: Board) -> Option<Option<Board>> {
     let Some(seen) = seen else { return Some(None) };
     let seen: Board = seen.parse().ok()?;
-    let kind = match (seen.kind, board.kind) {
-        (Kind::Charuco { dictionary, layout, .. }, Kind::Charuco { marker_mm, .. }) => {
-            Kind::Charuco { marker_mm, dictionary, layout }
-        }
-        (Kind::Tags { family, .. }, Kind::Tags { gap_mm, .. }) => Kind::Tags { gap_mm, family },
-        (kind, _) => kind,
-    };
-    Some(Some(Board { squares: seen.squares, kind, ..board }))
+    let same = Board { squares: seen.squares, kind: seen.kind, ..board };
+    let Some(mm) = seen.marked_mm() else { return Some(Some(same)) };
+    let scaled_mm = mm * board.square_mm / seen.square_mm;
+    // To the bit, where it is not another size that was seen.
+    let is_own = |own_mm: &f64| (own_mm - scaled_mm).abs() < 1e-9 * scaled_mm;
+    Some(Some(same.with_marked_mm(board.marked_mm().filter(is_own).unwrap_or(scaled_mm))?))
 }
 
 #[cfg(test)]
@@ -226,6 +224,10 @@ mod tests {
         assert_eq!(parse(&entry, asked), Some(refusal(seen)));
         let [seen, asked] = boards(["charuco:5x4:60:45:DICT_5X5_50:old", "charuco:4x5:60:45:DICT_4X4_100"]);
         assert_eq!(parse(&entry, asked), Some(refusal(seen)));
+        // Markers of another size than was asked for are those that were seen.
+        let [seen, asked] = boards(["charuco:4x5:54:27:DICT_4X4_100", "charuco:4x5:60:45:DICT_4X4_100"]);
+        let scaled = boards(["charuco:4x5:60:30:DICT_4X4_100"; 2])[0];
+        assert_eq!(parse(&text(&refusal(seen)), asked), Some(refusal(scaled)));
     }
 
     #[test]

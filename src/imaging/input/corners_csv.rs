@@ -72,7 +72,8 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
     let [left_size, right_size] =
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
     let (pairs, skipped) = gather(rows, board);
-    Ok(Corners { board, left_size, right_size, pairs, skipped, open: Vec::new(), notes })
+    let (blind, open) = (Vec::new(), Vec::new());
+    Ok(Corners { board, left_size, right_size, pairs, skipped, blind, open, notes })
 }
 
 /// The size of one side's pictures: what the file holds, or else what was said. All of its corners lie inside.
@@ -233,6 +234,7 @@ mod tests {
                 right: vec![plain(corner(1, 1, 3.0))],
             }],
             skipped: Vec::new(),
+            blind: Vec::new(),
             open: Vec::new(),
             notes: Vec::new(),
         };

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
+use crate::imaging::{Board, Corner, Corners, PairCorners, Side, Skipped};
 use crate::stereo::data::{Observation, View};
 use crate::stereo::error::{Error, ONE_PICTURE};
 use crate::stereo::init::homography::{self, FEWEST_CORNERS};
@@ -31,7 +31,7 @@ pub struct Candidates {
 impl Candidates {
     /// Gathers them; a camera whose lens is known is not looked for in its pictures.
     pub fn new(corners: &Corners, known: Option<&KnownLenses>) -> Result<Candidates, Error> {
-        let not_found = |s: &crate::imaging::Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
+        let not_found = |s: &Skipped| DiscardedPair::new(&s.pair, Cause::NoBoard, s.reason.clone());
         let mut discarded: Vec<DiscardedPair> = corners.skipped.iter().map(not_found).collect();
         let mut views = Vec::new();
         let fewest = if corners.board.is_coded() { 0 } else { FEWEST_CORNERS.max(fewest_corners(&corners.board)) };
@@ -61,7 +61,8 @@ impl Candidates {
         }
         let both = |view: &&View| Side::BOTH.into_iter().all(|side| view.active(side).next().is_some());
         if views.iter().filter(both).count() == 0 {
-            return Err(Error::NothingInCommon { pairs: views.len() });
+            let blind = Side::BOTH.into_iter().find_map(|side| blind(corners, &views, side));
+            return Err(blind.unwrap_or(Error::NothingInCommon { pairs: views.len() }));
         }
         let sizes = [corners.left_size, corners.right_size];
         let cameras: Vec<Option<OneCamera>> = Side::BOTH
@@ -71,7 +72,8 @@ impl Candidates {
                 None => single_camera::one_camera(&views, side, sizes[side as usize], corners.board.diagonal_mm()),
             })
             .collect();
-        let of = |side: Side| cameras[side as usize].clone().ok_or(Error::NoCamera { side });
+        let no_camera = |side: Side| blind(corners, &views, side).unwrap_or(Error::NoCamera { side });
+        let of = |side: Side| cameras[side as usize].clone().ok_or_else(|| no_camera(side));
         let cameras = [of(Side::Left)?, of(Side::Right)?];
         Ok(Candidates {
             board: corners.board,
@@ -100,6 +102,22 @@ impl Candidates {
         let px = 2.0 * moves.fold(0.0, f64::max);
         (px <= HARDLY * f64::from(self.width_px)).then_some((self.views.len(), px))
     }
+}
+
+/// Where a side shows corners in hardly any pair: how many, and why it shows none in the others.
+fn blind(corners: &Corners, views: &[View], side: Side) -> Option<Error> {
+    /// One pair in so many is hardly any.
+    const HARDLY: usize = 10;
+    let (seeing, without): (Vec<&View>, Vec<&View>) = views.iter().partition(|view| view.active(side).next().is_some());
+    let why = |view: &&View| {
+        let known = corners.blind.iter().find(|(of, skipped)| *of == side && skipped.pair == view.pair);
+        let reason =
+            known.map_or_else(|| "no corner that can be measured".to_owned(), |(_, skipped)| skipped.reason.clone());
+        Skipped { pair: view.pair.clone(), reason }
+    };
+    let (found, total) = (seeing.len(), views.len());
+    let error = || Error::OneSideBlind { side, found, total, without: without.iter().map(why).collect() };
+    (HARDLY * found <= total).then(error)
 }
 
 /// What is said of a pair of which so few corners count. Of those that were seen and not measured, smeared or in glare, the rest is.

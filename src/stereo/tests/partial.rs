@@ -1,7 +1,7 @@
 //! Boards whose corners have numbers of their own: each picture shows another part, some pairs are seen by one camera alone.
 
 use super::*;
-use crate::imaging::{Board, Corner};
+use crate::imaging::{Board, Corner, PairCorners, Side, Skipped};
 use crate::stereo::Error;
 use crate::stereo::judge::verdict::Verdict;
 
@@ -73,6 +73,29 @@ fn cameras_that_have_no_corner_in_common_are_told() {
     assert!(matches!(held_out::hold_out(&found, None), Err(Error::NothingInCommon { pairs: 10 })));
     let never = seen(&world, 1, |i, right, _, _| i.is_multiple_of(2) == right);
     assert!(matches!(calibrate(&never, &BROWN4), Err(Error::NothingInCommon { pairs: 10 })));
+}
+
+#[test]
+fn a_camera_that_shows_the_board_in_no_pair_is_named_with_the_reason() {
+    let world = world(11);
+    for blind in Side::BOTH {
+        let mut corners = seen(&world, 1, |_, right, _, _| (blind == Side::Right) != right);
+        let why =
+            |reason: &str, pair: &PairCorners| (blind, Skipped { pair: pair.pair.clone(), reason: reason.to_owned() });
+        corners.blind = corners.pairs.iter().map(|pair| why("shows the board mirrored", pair)).collect();
+        let Err(error) = calibrate(&corners, &BROWN4) else { panic!("{blind:?}") };
+        let (said, side) = (error.to_string(), blind.name());
+        assert!(said.starts_with(&format!("none of 11 {side} pictures show the board")), "{said}");
+        assert!(said.contains("and 3 more: shows the board mirrored"), "{said}");
+        // Corners that were not found but read come without a reason.
+        corners.blind.clear();
+        assert!(matches!(calibrate(&corners, &BROWN4), Err(Error::OneSideBlind { found: 0, total: 11, .. })));
+    }
+    // Each camera shows the board, in a third of the pairs and in the others: neither is the one to look at.
+    let mut corners = seen(&world, 1, |i, right, _, _| i.is_multiple_of(3) == right);
+    let reason = "no board found".to_owned();
+    corners.blind.push((Side::Right, Skipped { pair: corners.pairs[1].pair.clone(), reason }));
+    assert!(matches!(calibrate(&corners, &BROWN4), Err(Error::NothingInCommon { pairs: 11 })));
 }
 
 #[test]

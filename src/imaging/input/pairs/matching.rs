@@ -159,12 +159,11 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
     let (left, right) = (stem(left), stem(right));
     match by {
         PairBy::Number => {
-            let written = [left, right]
-                .map(|stem| numbers(stem).into_iter().rfind(|number| key.split('\0').next() == Some(plain(number))));
-            match written {
-                [Some(left), Some(right)] if left == right => left.to_owned(),
-                // What is behind the mark tells forms of names apart.
-                _ => key.split('\0').next().unwrap_or_default().to_owned(),
+            // What is behind the mark tells forms of names apart.
+            let numbers = key.split('\0').next().unwrap_or_default();
+            match [left, right].map(|stem| written(stem, numbers)) {
+                [Some(left), Some(right)] if left == right => left,
+                _ => numbers.to_owned(),
             }
         }
         _ if left == right => left.to_owned(),
@@ -174,6 +173,21 @@ fn name(by: PairBy, key: &str, left: &Utf8Path, right: &Utf8Path) -> String {
             alike.map_or_else(|| key.to_owned(), |[a, b]| a.without_side(left, b))
         }
     }
+}
+
+/// Numbers of a name as they are written in it, with their zeros in front.
+fn written(stem: &str, plain_numbers: &str) -> Option<String> {
+    let all = numbers(stem);
+    let mut before = all.as_slice();
+    let mut found = Vec::new();
+    // The last ones count.
+    for number in plain_numbers.rsplit('_') {
+        let at = before.iter().rposition(|written| plain(written) == number)?;
+        found.push(before[at]);
+        before = &before[..at];
+    }
+    found.reverse();
+    Some(found.join("_"))
 }
 
 /// The numbers that are not the same in names that are alike but for their numbers and words for a side, and what these names have in common.

@@ -156,6 +156,14 @@ fn numbers_pair_where_names_do_not() {
 }
 
 #[test]
+fn numbers_of_a_name_keep_the_zeros_that_both_sides_write() {
+    let stamps = "{L/front,R/side}-{03112022091500-0,03112022091502-07,03112022091504-11}.png";
+    assert_eq!(names(stamps), "03112022091500_0 03112022091502_07 03112022091504_11");
+    // Written with zeros on one side only it is still one number.
+    assert_eq!(names("L/p007_x01.png L/p008_x02.png R/q7_y1.png R/q8_y2.png"), "7_1 8_2");
+}
+
+#[test]
 fn a_second_naming_pairs_what_the_first_leaves_over() {
     let series = "cam0/image0_{0..8}.png cam1/image1_{0..8}.png";
     let (_keep, path) = folder(&expanded(&format!("{series} cam0/{{2,3,Image1}}.bmp cam1/{{2,8}}.bmp")));

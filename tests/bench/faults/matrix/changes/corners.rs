@@ -70,6 +70,7 @@ impl World {
             right_size: size,
             pairs,
             skipped: Vec::new(),
+            blind: Vec::new(),
             open: Vec::new(),
             notes: Vec::new(),
         }
