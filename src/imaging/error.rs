@@ -276,6 +276,7 @@ mod tests {
             assert!(hint(0, 0, board).contains("--squares") || hint(0, 0, board).contains("--board"));
         }
     }
+
     /// The hint where none of some pairs shows a board, for these reasons.
     fn hint_for(board: &str, reasons: &[&str], other: Option<&str>) -> String {
         let board = Box::new(board.parse().unwrap());

@@ -41,8 +41,8 @@ impl Turns {
         let (mut sine, mut cosine) = ([0.0; LANES], [0.0; LANES]);
         // Asked of all at once: a loop that may call the library's sine is not worked on together.
         let mut all_near = true;
-        for l in 0..LANES {
-            all_near &= turn(l).is_near(rad[l]);
+        for (l, rad) in rad.iter().enumerate() {
+            all_near &= turn(l).is_near(*rad);
         }
         if all_near {
             for l in 0..LANES {

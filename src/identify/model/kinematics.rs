@@ -135,30 +135,15 @@ impl Kinematics {
         let mut places = Vec::with_capacity(LANES * self.lanes.len());
         for lanes in &self.lanes {
             let mut frames = Frames::base();
-            for (i, ((joint, of_joint), link)) in robot.joints.iter().zip(&lanes.joints).zip(&links.0).enumerate() {
-                let acts = || self.acts.iter().zip(&lanes.features).map(|((k, act), f)| (act, offsets[*k] / 1000.0, f));
-                let mut angle_rad = of_joint.angle_rad;
-                for (_, offset, feature) in acts().filter(|(act, ..)| **act == Act::Turns(i)) {
-                    add(&mut angle_rad, offset, &feature[0]);
-                }
-                let (mut alpha, mut beta) = ([[0.0; LANES]; 2], [[0.0; LANES]; 2]);
-                let standing = [joint.alpha_rad, joint.beta_rad];
-                for (axis, swung) in [&mut alpha, &mut beta].into_iter().enumerate() {
-                    let Some(own) = &of_joint.tilt_rad else {
-                        let (sine, cosine) = link[axis].sin_cos(standing[axis]);
-                        *swung = [[sine; LANES], [cosine; LANES]];
-                        continue;
-                    };
-                    let mut tilted_rad = [standing[axis]; LANES];
-                    add(&mut tilted_rad, 1.0, &own[axis]);
-                    for (_, offset, feature) in acts().filter(|(act, ..)| **act == Act::Tilts(i)) {
-                        add(&mut tilted_rad, offset, &feature[axis]);
-                    }
-                    *swung = Turns::of_one(link[axis]).sin_cos(&tilted_rad);
-                }
+            for (i, (joint, link)) in robot.joints.iter().zip(&links.0).enumerate() {
+                let alpha = self.swung(lanes, (i, 0), (joint.alpha_rad, link[0]), offsets);
+                let beta = self.swung(lanes, (i, 1), (joint.beta_rad, link[1]), offsets);
+                let mut angle_rad = lanes.joints[i].angle_rad;
+                self.correct(&mut angle_rad, (Act::Turns(i), 0), lanes, offsets);
+                // As of one pose by `Joint::turn_rad` and `Joint::shift_mm`.
                 let (mut turn_rad, mut shift_mm) = ([joint.theta_rad; LANES], [joint.d_mm; LANES]);
                 add(if joint.slides { &mut shift_mm } else { &mut turn_rad }, joint.sign, &angle_rad);
-                let turn = of_joint.turns.sin_cos(&turn_rad);
+                let turn = lanes.joints[i].turns.sin_cos(&turn_rad);
                 frames.over([&alpha, &beta, &turn], joint.a_mm, &shift_mm);
             }
             places.extend((0..LANES).map(|pose| {
@@ -168,6 +153,35 @@ impl Kinematics {
         }
         places.truncate(self.poses.len());
         places
+    }
+
+    /// Sines and cosines of alpha (axis 0) or beta (axis 1) of a joint, which is so many rad before anything tilts it.
+    #[inline(always)]
+    fn swung(
+        &self,
+        lanes: &LaneConstants,
+        (joint, axis): (usize, usize),
+        (rad, turn): (f64, Turn),
+        offsets: &[f64],
+    ) -> [Lane; 2] {
+        let Some(own) = &lanes.joints[joint].tilt_rad else {
+            let (sine, cosine) = turn.sin_cos(rad);
+            return [[sine; LANES], [cosine; LANES]];
+        };
+        let mut tilted_rad = [rad; LANES];
+        add(&mut tilted_rad, 1.0, &own[axis]);
+        self.correct(&mut tilted_rad, (Act::Tilts(joint), axis), lanes, offsets);
+        Turns::of_one(turn).sin_cos(&tilted_rad)
+    }
+
+    /// Adds what the corrections add that act like this.
+    #[inline(always)]
+    fn correct(&self, to_rad: &mut Lane, (act, axis): (Act, usize), lanes: &LaneConstants, offsets: &[f64]) {
+        for ((k, own), feature) in self.acts.iter().zip(&lanes.features) {
+            if *own == act {
+                add(to_rad, offsets[*k] / 1000.0, &feature[axis]);
+            }
+        }
     }
 
     /// The robot as it stands at a pose.
