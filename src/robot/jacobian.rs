@@ -78,30 +78,36 @@ impl Turn {
     }
 }
 
-/// Alpha and beta of the joints where nothing tilts them.
-pub struct Links(pub Vec<[Turn; 2]>);
+/// How a joint stands: sine and cosine of its alpha, its beta and its turn, and its way along its axis, mm.
+#[derive(Debug, Clone, Copy)]
+pub struct Stance {
+    pub alpha: [f64; 2],
+    pub beta: [f64; 2],
+    pub turn: [f64; 2],
+    pub shift_mm: f64,
+}
 
-impl Links {
-    pub fn new(joints: &[Joint]) -> Links {
-        Links(joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect())
+impl Stance {
+    fn new(joint: &Joint, q: f64) -> Stance {
+        let [alpha, beta, turn] = [joint.alpha_rad, joint.beta_rad, joint.turn_rad(q)].map(|rad| rad.sin_cos().into());
+        Stance { alpha, beta, turn, shift_mm: joint.shift_mm(q) }
     }
 }
 
 impl Screws {
     /// Of the robot as it stands (see [`super::Robot::bent`]), with the target at `tool_mm` in the last joint's frame.
     pub fn new(bent: &Bent, tool_mm: &Vector3<f64>) -> Screws {
-        Screws::with_links(bent, tool_mm, &Links::new(&bent.joints), &[])
+        let stances = bent.joints.iter().zip(&bent.joints_rad).map(|(joint, &q)| Stance::new(joint, q));
+        Screws::standing(&bent.joints, stances, tool_mm)
     }
 
-    /// The same with the links of the robot as it is before anything tilts it, and turns that the joints' are near to, where such are known.
-    pub fn with_links(bent: &Bent, tool_mm: &Vector3<f64>, links: &Links, near: &[Turn]) -> Screws {
-        let mut joints = Vec::with_capacity(bent.joints.len());
+    /// The same of joints that stand like this; of the joints themselves only lengths, signs and kinds count.
+    pub fn standing(joints: &[Joint], stances: impl Iterator<Item = Stance>, tool_mm: &Vector3<f64>) -> Screws {
+        let mut screws = Vec::with_capacity(joints.len());
         let mut rotation = Matrix3::identity();
         let mut origin = Point3::origin();
-        for (i, ((joint, &q), [alpha, beta])) in bent.joints.iter().zip(&bent.joints_rad).zip(&links.0).enumerate() {
-            let ((sa, ca), (sb, cb)) = (alpha.sin_cos(joint.alpha_rad), beta.sin_cos(joint.beta_rad));
-            let turn_rad = joint.turn_rad(q);
-            let (st, ct) = near.get(i).map_or_else(|| turn_rad.sin_cos(), |near| near.sin_cos(turn_rad));
+        for (joint, Stance { alpha: [sa, ca], beta: [sb, cb], turn: [st, ct], shift_mm }) in joints.iter().zip(stances)
+        {
             let x: Vector3<f64> = rotation.column(0).into();
             let (y0, z0) = (rotation.column(1), rotation.column(2));
             let y: Vector3<f64> = ca * y0 + sa * z0;
@@ -110,11 +116,11 @@ impl Screws {
             origin += joint.a_mm * x;
             let x1 = cb * x - sb * z1;
             let z = sb * x + cb * z1;
-            joints.push(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
-            origin += joint.shift_mm(q) * z;
+            screws.push(JointScrews { x, before, y, z, origin, sign: joint.sign, slides: joint.slides });
+            origin += shift_mm * z;
             rotation = Matrix3::from_columns(&[ct * x1 + st * y, ct * y - st * x1, z]);
         }
-        Screws { joints, base_from_flange: rotation, target_mm: origin + rotation * tool_mm }
+        Screws { joints: screws, base_from_flange: rotation, target_mm: origin + rotation * tool_mm }
     }
 
     /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).

@@ -1,12 +1,12 @@
-//! Where the target is at many poses, eight of them at a time, for what asks for no derivatives: a swarm takes millions of poses.
+//! How joints stand at many poses, eight of them at a time, and where the target is there: a swarm takes millions of poses.
 //!
 //! In: sines and cosines of the joints at eight poses, their ways. Out: the flange's rotation and the target's point at each, base frame, the same
-//! to the bit as [`super::jacobian::Screws`] has them one pose at a time. Poses lie side by side in arrays, which the compiler works on together
+//! to the bit as [`super::jacobian::Screws`] has them one pose at a time with its derivatives. Poses lie side by side in arrays, which the compiler works on together
 //! (see `crate::widest`); what is not inlined there would be slower.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
-use super::jacobian::Turn;
+use super::jacobian::{Stance, Turn};
 
 /// Poses that are computed together.
 pub const LANES: usize = 8;
@@ -57,6 +57,22 @@ impl Turns {
     }
 }
 
+/// How a joint stands at each of the poses (see [`Stance`]).
+pub struct Stances {
+    pub alpha: [Lane; 2],
+    pub beta: [Lane; 2],
+    pub turn: [Lane; 2],
+    pub shift_mm: Lane,
+}
+
+impl Stances {
+    /// At one of the poses.
+    pub fn at(&self, pose: usize) -> Stance {
+        let [alpha, beta, turn] = [&self.alpha, &self.beta, &self.turn].map(|both| both.map(|lane| lane[pose]));
+        Stance { alpha, beta, turn, shift_mm: self.shift_mm[pose] }
+    }
+}
+
 /// The frames that the chain has reached at each of the poses, base frame.
 pub struct Frames {
     /// Columns of the rotations, each by its components.
@@ -71,10 +87,10 @@ impl Frames {
         Frames { columns: std::array::from_fn(column), origin_mm: [[0.0; LANES]; 3] }
     }
 
-    /// Goes on over a joint: sine and cosine of alpha, beta and of its turn, its length and its ways, mm.
+    /// Goes on over a joint of this length, mm.
     #[inline(always)]
-    pub fn over(&mut self, [alpha, beta, turn]: [&[Lane; 2]; 3], a_mm: f64, shift_mm: &Lane) {
-        let ([sa, ca], [sb, cb], [st, ct]) = (alpha, beta, turn);
+    pub fn over(&mut self, a_mm: f64, joint: &Stances) {
+        let Stances { alpha: [sa, ca], beta: [sb, cb], turn: [st, ct], shift_mm } = joint;
         let [xs, ys, zs] = &mut self.columns;
         for (((xs, ys), zs), origin) in xs.iter_mut().zip(ys).zip(zs).zip(&mut self.origin_mm) {
             for l in 0..LANES {

@@ -7,9 +7,9 @@
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use rayon::prelude::*;
 
-use crate::robot::bent::{Bent, Torques};
-use crate::robot::jacobian::{Feature, Links, Screws, Turn, feature};
-use crate::robot::lanes::{Frames, LANES, Lane, Turns};
+use crate::robot::bent::Torques;
+use crate::robot::jacobian::{Feature, Screws, Turn, feature};
+use crate::robot::lanes::{Frames, LANES, Lane, Stances, Turns};
 use crate::robot::{Joint, Parameter, Robot};
 use crate::widest::widest;
 
@@ -25,8 +25,7 @@ pub struct Kinematics {
     pub parameters: Vec<Parameter>,
     /// Places among the parameters of those that act otherwise at each pose, and what they do there.
     acts: Vec<(usize, Act)>,
-    poses: Vec<PoseConstants>,
-    /// The same poses, several side by side; the last one fills them up.
+    /// Several poses side by side.
     lanes: Vec<LaneConstants>,
 }
 
@@ -44,7 +43,7 @@ impl Act {
     }
 }
 
-#[derive(Debug, Clone)]
+/// What offsets leave as it is at a pose.
 struct PoseConstants {
     /// Angles with the nominal robot's own corrections, rad.
     angles_rad: Vec<f64>,
@@ -56,11 +55,11 @@ struct PoseConstants {
     features: Vec<Feature>,
 }
 
-/// What [`PoseConstants`] are, of several poses.
+/// The same at several poses; the last one fills the lanes up.
 #[derive(Debug, Clone)]
 struct LaneConstants {
+    poses: usize,
     joints: Vec<JointLanes>,
-    /// One an entry of [`Kinematics::acts`].
     features: Vec<[Lane; 2]>,
 }
 
@@ -70,6 +69,13 @@ struct JointLanes {
     turns: Turns,
     /// By the nominal robot's own terms; `None` where no term tilts the joint.
     tilt_rad: Option<[Lane; 2]>,
+}
+
+/// A robot with its offsets; alpha and beta of its joints where nothing tilts them.
+struct Shifted<'a> {
+    robot: Robot,
+    links: Vec<[Turn; 2]>,
+    offsets: &'a [f64],
 }
 
 /// Where the target is at one pose, and how that changes.
@@ -108,114 +114,99 @@ impl Kinematics {
         let poses: Vec<PoseConstants> = joints_rad.iter().map(constants).collect();
         let acts: Vec<_> = parameters.iter().enumerate().filter_map(|(k, &p)| Act::of(p).map(|act| (k, act))).collect();
         let lanes = poses.chunks(LANES).map(|poses| LaneConstants::new(poses, &acts)).collect();
-        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, poses, lanes }
+        Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, lanes }
     }
 
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
         let robot = self.nominal.shifted(&self.parameters, offsets);
-        let links = Links::new(&robot.joints);
-        if !derivatives {
-            return widest(
-                #[inline(always)]
-                || self.ends(&robot, &links, offsets),
-            );
+        let links = robot.joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect();
+        let shifted = Shifted { robot, links, offsets };
+        if derivatives {
+            let columns = |lanes| self.with_columns(&shifted, lanes);
+            return self.lanes.par_iter().with_min_len(SHARED_POSES / LANES).flat_map_iter(columns).collect();
         }
-        let bent = || Bent { joints: Vec::new(), joints_rad: Vec::new() };
-        let place = |bent: &mut Bent, pose: &PoseConstants| {
-            self.bend(&robot, pose, offsets, bent);
-            self.with_columns(&robot, &links, pose, bent)
-        };
-        self.poses.par_iter().with_min_len(SHARED_POSES).map_init(bent, place).collect()
+        let mut places = Vec::with_capacity(LANES * self.lanes.len());
+        widest(
+            #[inline(always)]
+            || self.lanes.iter().for_each(|lanes| self.ends(&shifted, lanes, &mut places)),
+        );
+        places
     }
 
-    /// Every pose without derivatives.
+    /// Several poses without derivatives.
     #[inline(always)]
-    fn ends(&self, robot: &Robot, links: &Links, offsets: &[f64]) -> Vec<Place> {
-        let mut places = Vec::with_capacity(LANES * self.lanes.len());
-        for lanes in &self.lanes {
-            let mut frames = Frames::base();
-            for (i, (joint, link)) in robot.joints.iter().zip(&links.0).enumerate() {
-                let alpha = self.swung(lanes, (i, 0), (joint.alpha_rad, link[0]), offsets);
-                let beta = self.swung(lanes, (i, 1), (joint.beta_rad, link[1]), offsets);
-                let mut angle_rad = lanes.joints[i].angle_rad;
-                self.correct(&mut angle_rad, (Act::Turns(i), 0), lanes, offsets);
-                // As of one pose by `Joint::turn_rad` and `Joint::shift_mm`.
-                let (mut turn_rad, mut shift_mm) = ([joint.theta_rad; LANES], [joint.d_mm; LANES]);
-                add(if joint.slides { &mut shift_mm } else { &mut turn_rad }, joint.sign, &angle_rad);
-                let turn = lanes.joints[i].turns.sin_cos(&turn_rad);
-                frames.over([&alpha, &beta, &turn], joint.a_mm, &shift_mm);
-            }
-            places.extend((0..LANES).map(|pose| {
-                let (rotation, point_mm) = frames.end(pose, &robot.tool_mm);
-                Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
-            }));
+    fn ends(&self, shifted: &Shifted, lanes: &LaneConstants, places: &mut Vec<Place>) {
+        let mut frames = Frames::base();
+        for (i, joint) in shifted.robot.joints.iter().enumerate() {
+            frames.over(joint.a_mm, &self.stances(shifted, lanes, i));
         }
-        places.truncate(self.poses.len());
-        places
+        places.extend((0..lanes.poses).map(|pose| {
+            let (rotation, point_mm) = frames.end(pose, &shifted.robot.tool_mm);
+            Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
+        }));
+    }
+
+    /// How a joint stands.
+    #[inline(always)]
+    fn stances(&self, shifted: &Shifted, lanes: &LaneConstants, i: usize) -> Stances {
+        let (joint, own, offsets) = (&shifted.robot.joints[i], &lanes.joints[i], shifted.offsets);
+        let mut angle_rad = own.angle_rad;
+        self.correct(&mut angle_rad, (Act::Turns(i), 0), lanes, offsets);
+        // As of one pose by `Joint::turn_rad` and `Joint::shift_mm`.
+        let (mut turn_rad, mut shift_mm) = ([joint.theta_rad; LANES], [joint.d_mm; LANES]);
+        add(if joint.slides { &mut shift_mm } else { &mut turn_rad }, joint.sign, &angle_rad);
+        Stances {
+            alpha: self.swung(shifted, lanes, (i, 0), joint.alpha_rad),
+            beta: self.swung(shifted, lanes, (i, 1), joint.beta_rad),
+            turn: own.turns.sin_cos(&turn_rad),
+            shift_mm,
+        }
     }
 
     /// Sines and cosines of alpha (axis 0) or beta (axis 1) of a joint, which is so many rad before anything tilts it.
     #[inline(always)]
-    fn swung(
-        &self,
-        lanes: &LaneConstants,
-        (joint, axis): (usize, usize),
-        (rad, turn): (f64, Turn),
-        offsets: &[f64],
-    ) -> [Lane; 2] {
-        let Some(own) = &lanes.joints[joint].tilt_rad else {
+    fn swung(&self, shifted: &Shifted, lanes: &LaneConstants, (i, axis): (usize, usize), rad: f64) -> [Lane; 2] {
+        let turn = shifted.links[i][axis];
+        let Some(own) = &lanes.joints[i].tilt_rad else {
             let (sine, cosine) = turn.sin_cos(rad);
             return [[sine; LANES], [cosine; LANES]];
         };
         let mut tilted_rad = [rad; LANES];
         add(&mut tilted_rad, 1.0, &own[axis]);
-        self.correct(&mut tilted_rad, (Act::Tilts(joint), axis), lanes, offsets);
+        self.correct(&mut tilted_rad, (Act::Tilts(i), axis), lanes, shifted.offsets);
         Turns::of_one(turn).sin_cos(&tilted_rad)
     }
 
     /// Adds what the corrections add that act like this.
     #[inline(always)]
     fn correct(&self, to_rad: &mut Lane, (act, axis): (Act, usize), lanes: &LaneConstants, offsets: &[f64]) {
-        for ((k, own), feature) in self.acts.iter().zip(&lanes.features) {
+        for (k, own) in &self.acts {
             if *own == act {
-                add(to_rad, offsets[*k] / 1000.0, &feature[axis]);
+                add(to_rad, offsets[*k] / 1000.0, &lanes.features[*k][axis]);
             }
         }
     }
 
-    /// The robot as it stands at a pose.
-    fn bend(&self, robot: &Robot, pose: &PoseConstants, offsets: &[f64], bent: &mut Bent) {
-        bent.joints.clone_from(&robot.joints);
-        bent.joints_rad.clone_from(&pose.angles_rad);
-        for (joint, tilt) in pose.tilts_rad.iter().enumerate() {
-            bent.tilt(joint, *tilt);
-        }
-        for &(k, act) in &self.acts {
-            let (offset, feature) = (offsets[k] / 1000.0, pose.features[k]);
-            match act {
-                Act::Tilts(joint) => bent.tilt(joint, feature.map(|f| offset * f)),
-                Act::Turns(joint) => {
-                    if let Some(angle) = bent.joints_rad.get_mut(joint) {
-                        *angle += offset * feature[0];
-                    }
-                }
+    /// Several poses with derivatives.
+    fn with_columns(&self, shifted: &Shifted, lanes: &LaneConstants) -> Vec<Place> {
+        let joints = &shifted.robot.joints;
+        let stances: Vec<Stances> = (0..joints.len()).map(|i| self.stances(shifted, lanes, i)).collect();
+        let place = |pose: usize| {
+            let screws = Screws::standing(joints, stances.iter().map(|joint| joint.at(pose)), &shifted.robot.tool_mm);
+            let columns = |of: &dyn Fn(Parameter, Feature) -> Vector3<f64>| {
+                let features = lanes.features.iter().map(|both| both.map(|lane| lane[pose]));
+                let all = self.parameters.iter().zip(features).map(|(&p, f)| of(p, f));
+                Matrix3xX::from_iterator(self.parameters.len(), all.flat_map(<[f64; 3]>::from))
+            };
+            Place {
+                point_mm: screws.target_mm,
+                rotation: screws.base_from_flange,
+                point_columns: columns(&|p, f| screws.point_column(p, f)),
+                rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
             }
-        }
-    }
-
-    fn with_columns(&self, robot: &Robot, links: &Links, pose: &PoseConstants, bent: &Bent) -> Place {
-        let screws = Screws::with_links(bent, &robot.tool_mm, links, &pose.turns);
-        let columns = |of: &dyn Fn(Parameter, Feature) -> Vector3<f64>| {
-            let all = self.parameters.iter().zip(&pose.features).map(|(&p, &f)| of(p, f));
-            Matrix3xX::from_iterator(self.parameters.len(), all.flat_map(<[f64; 3]>::from))
         };
-        Place {
-            point_mm: screws.target_mm,
-            rotation: screws.base_from_flange,
-            point_columns: columns(&|p, f| screws.point_column(p, f)),
-            rotation_columns: columns(&|p, f| screws.rotation_column(p, f)),
-        }
+        (0..lanes.poses).map(place).collect()
     }
 }
 
@@ -238,8 +229,11 @@ impl LaneConstants {
             }
         };
         LaneConstants {
+            poses: poses.len(),
             joints: (0..poses.first().map_or(0, |pose| pose.turns.len())).map(joint).collect(),
-            features: acts.iter().map(|&(k, _)| both(&|pose| pose.features[k])).collect(),
+            features: (0..poses.first().map_or(0, |pose| pose.features.len()))
+                .map(|k| both(&|pose| pose.features[k]))
+                .collect(),
         }
     }
 }
