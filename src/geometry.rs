@@ -77,8 +77,16 @@ pub fn direction(v: &Vector3<f64>) -> (Vector3<f64>, f64) {
 
 /// The rigid transform `b_from_a` that brings pairs (a, b, weight) of points together best (Kabsch, 1976).
 pub fn fitted_frame(pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>) -> Transform {
+    fitted_frame_with_turns(pairs, &Matrix3::zeros())
+}
+
+/// The same where rotations of b from a were measured too: `turns` is their sum, each times half its weight, 1/rad^2.
+pub fn fitted_frame_with_turns(
+    pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>,
+    turns: &Matrix3<f64>,
+) -> Transform {
     let (mean_a, mean_b, covariance) = cross_covariance(pairs);
-    let rotation = nearest_rotation(&covariance);
+    let rotation = nearest_rotation(&(covariance + turns));
     transform_from_matrix(rotation, mean_b - rotation * mean_a)
 }
 

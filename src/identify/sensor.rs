@@ -101,6 +101,13 @@ pub struct Spot {
     pub extra: Matrix3xX<f64>,
 }
 
+impl Spot {
+    /// What the residual gains with extra unknowns of these values, mm.
+    pub fn gained(&self, extras: &[f64]) -> Vector3<f64> {
+        self.extra.column_iter().zip(extras).map(|(column, e)| column * *e).sum()
+    }
+}
+
 /// A residual before whitening, and the variance that the measurement gives it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Raw {

@@ -14,7 +14,6 @@ use super::points::Points;
 use super::state::State;
 use super::touch::Touch;
 use crate::geometry::Transform;
-use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::Raw;
 use crate::linear_algebra::{solution, without};
 
@@ -100,12 +99,12 @@ impl Block {
         }
     }
 
-    fn start(&self, places: &[Place]) -> Unknowns {
+    fn start(&self, state: &State) -> Unknowns {
         match self {
-            Block::Distances(distances) => Unknowns::Anchor(distances.start(places), 0.0),
+            Block::Distances(distances) => Unknowns::Anchor(distances.start(&state.places), 0.0),
             Block::Pairwise(_) => Unknowns::Nothing,
             Block::Touch(touch) => Unknowns::Sockets(touch.sockets.clone()),
-            Block::Points(points) => Unknowns::Frame(points.start(places)),
+            Block::Points(points) => Unknowns::Frame(points.start(state)),
         }
     }
 
@@ -141,7 +140,7 @@ impl Block {
 
     /// The unknowns at their best.
     pub(super) fn best(&self, state: &State) -> Unknowns {
-        let mut at = self.start(&state.places);
+        let mut at = self.start(state);
         if self.unknown_count() == 0 || matches!(self, Block::Points(points) if points.start_is_best()) {
             return at;
         }

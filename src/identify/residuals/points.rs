@@ -6,22 +6,16 @@ use super::normal::Normal;
 use super::smooth::Field;
 use super::state::State;
 use crate::geometry::{
-    Transform, cross_covariance, fitted_frame, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
+    Transform, fitted_frame, fitted_frame_with_turns, rigid_columns, rotation_matrix, rotation_vector_of_matrix,
 };
 use crate::identify::model::kinematics::Place;
 use crate::identify::sensor::{Raw, Spot};
 use crate::robot::jacobian::RAD_PER_MRAD;
 
-/// Points are on a line where they are scattered square to it by less than this share of what they are along it.
-const LINE: f64 = 0.01;
-
 /// The points of one placement.
 #[derive(Debug, Clone)]
 pub struct Points {
     pub spots: Vec<Spot>,
-    /// Where the search for the transform starts.
-    pub sensor_from_base: Transform,
-    pub on_a_line: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
     pub oriented: bool,
@@ -37,28 +31,28 @@ impl Points {
         if self.oriented { 6 } else { 3 }
     }
 
-    /// Whether points that a robot carries are on a line; parts of a body, which turn with it, never are.
-    pub fn are_on_a_line(spots: &[Spot]) -> bool {
-        let (_, _, spread) = cross_covariance(spots.iter().map(|s| (s.point_mm, s.point_mm, 1.0)));
-        let along = spread.symmetric_eigenvalues().max();
-        spots.iter().all(|s| s.on_body_mm.is_none()) && spread.trace() - along < LINE * LINE * along
-    }
-
-    /// Where the search for the transform starts: at the best for equal weights, where points alone tell it; that is the end where they weigh
-    /// alike. Of points on a line the turn about it has a second optimum, and small steps from elsewhere may end in either.
-    pub(super) fn start(&self, places: &[Place]) -> Transform {
-        if self.oriented && !self.on_a_line {
-            return self.sensor_from_base;
-        }
+    /// Where the search for the transform starts: at the best for weights that are alike in all directions and for orientations whose errors are small
+    /// angles. Of points on a line the turn about it has a second optimum, and small steps from elsewhere may end in either.
+    pub(super) fn start(&self, state: &State) -> Transform {
+        let target = self.turned_target(state.extras);
         let at = |s: &Spot| {
-            let place = &places[s.pose];
-            place.point_mm + Points::on_body(place, &self.flange_from_target, s).unwrap_or_else(Vector3::zeros)
+            let place = &state.places[s.pose];
+            place.point_mm + Points::on_body(place, &target, s).unwrap_or_else(Vector3::zeros)
         };
-        fitted_frame(self.spots.iter().map(|s| (at(s), s.point_mm, s.weight * s.weight)))
+        let seen = |s: &Spot| s.point_mm - s.gained(state.extras);
+        if !self.oriented {
+            return fitted_frame(self.spots.iter().map(|s| (at(s), seen(s), s.weight * s.weight)));
+        }
+        // Half the square of the difference of two rotation matrices is the square of a small angle between them.
+        let turns: Matrix3<f64> = self.spots.iter().fold(Matrix3::zeros(), |sum, s| {
+            let measured = s.rotation.map(|measured| measured * (state.places[s.pose].rotation * target).transpose());
+            sum + 0.5 * (s.weight / state.scatter.rotation_rad).powi(2) * measured.unwrap_or_else(Matrix3::zeros)
+        });
+        let weight = |s: &Spot| s.whitener.norm_squared() / 3.0;
+        fitted_frame_with_turns(self.spots.iter().map(|s| (at(s), seen(s), weight(s))), &turns)
     }
 
-    /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all directions, of which nothing
-    /// but the transform is unknown.
+    /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all directions.
     pub(super) fn start_is_best(&self) -> bool {
         /// Of the whitener: far above its rounding, far below any difference of weights.
         const ALIKE: f64 = 1e-12;
@@ -66,9 +60,9 @@ impl Points {
         let unit = first.whitener[(0, 0)] / first.weight;
         let is_alike = |s: &Spot| {
             let alike = Matrix3::from_diagonal_element(unit * s.weight);
-            s.extra.is_empty() && (s.whitener - alike).amax() <= ALIKE * unit
+            (s.whitener - alike).amax() <= ALIKE * unit
         };
-        !self.oriented && self.target.is_empty() && self.field.is_none() && self.spots.iter().all(is_alike)
+        !self.oriented && self.field.is_none() && self.spots.iter().all(is_alike)
     }
 
     /// Numbers that were measured with some weight.
@@ -98,11 +92,7 @@ impl Points {
             let place = &state.places[spot.pose];
             let part = Points::on_body(place, &flange_from_target, spot).unwrap_or_else(Vector3::zeros);
             let turned = rotation * (place.point_mm.coords + part);
-            let mut residual = turned + frame.translation.vector - spot.point_mm.coords;
-            for (column, e) in spot.extra.column_iter().zip(state.extras) {
-                residual += column * *e;
-            }
-            (turned, residual)
+            (turned, turned + frame.translation.vector - spot.point_mm.coords + spot.gained(state.extras))
         })
     }
 
@@ -260,9 +250,10 @@ mod tests {
     use super::*;
     use crate::geometry::transform;
     use crate::identify::sensor::Scatter;
+    use crate::linear_algebra::solution;
 
     /// Forty points of a robot along 300 mm, off the line by up to `off_mm`, and as a sensor reads them that stands turned about it.
-    fn along(off_mm: f64, sensor_from_base: Transform, start: Transform) -> (Points, Vec<Place>) {
+    fn along(off_mm: f64, sensor_from_base: Transform) -> (Points, Vec<Place>) {
         let at = |k: usize| {
             let k = k as f64;
             Point3::new(500.0 + k * 300.0 / 39.0, off_mm * (1.3 * k).sin(), 200.0 + off_mm * (2.1 * k).cos())
@@ -284,46 +275,51 @@ mod tests {
             extra: Matrix3xX::zeros(0),
         };
         let spots: Vec<Spot> = (0..40).map(spot).collect();
-        let on_a_line = Points::are_on_a_line(&spots);
         let (flange_from_target, target) = (Matrix3::identity(), Vec::new());
-        let points = Points {
-            spots,
-            sensor_from_base: start,
-            on_a_line,
-            flange_from_target,
-            oriented: false,
-            target,
-            field: None,
-        };
+        let points = Points { spots, flange_from_target, oriented: false, target, field: None };
         (points, (0..40).map(place).collect())
     }
 
     #[test]
-    fn points_start_at_the_best_turn_and_orientations_where_they_were_told() {
+    fn points_start_at_the_best_turn_and_orientations_near_it() {
+        let scatter = Scatter { rotation_rad: 1e-3, ..Scatter::of_point(1.0) };
+        let state = |places: &[Place]| State { places: places.to_vec(), extras: &[], scatter: &scatter };
         for turn_rad in [0.3, 1.7, 3.1] {
             let sensor_from_base = transform(Vector3::new(turn_rad, 0.0, 0.0), Vector3::new(10.0, -70.0, 900.0));
-            let elsewhere = transform(Vector3::new(turn_rad + 3.0, 0.1, 0.0), Vector3::zeros());
             for off_mm in [0.01, 0.3, 0.6] {
-                let (points, places) = along(off_mm, sensor_from_base, elsewhere);
-                let start = points.start(&places);
+                let (points, places) = along(off_mm, sensor_from_base);
+                let start = points.start(&state(&places));
                 let misses = points.spots.iter().map(|s| (start * places[s.pose].point_mm - s.point_mm).norm());
                 let miss = misses.fold(0.0, f64::max);
-                assert!(points.on_a_line && miss < 1e-6, "{turn_rad} rad {off_mm} mm: {} {miss}", points.on_a_line);
+                assert!(miss < 1e-6, "{turn_rad} rad {off_mm} mm: {miss}");
             }
-            let (mut points, places) = along(30.0, sensor_from_base, elsewhere);
-            assert!(
-                !points.on_a_line
-                    && (points.start(&places).inverse() * sensor_from_base).translation.vector.norm() < 1e-6
-            );
+            // Orientations of some mrad: one small step from the start is what is left.
+            let (mut points, mut places) = along(30.0, sensor_from_base);
             points.oriented = true;
-            assert_eq!(points.start(&places), elsewhere);
+            for (k, (spot, place)) in points.spots.iter_mut().zip(&mut places).enumerate() {
+                let wave = Vector3::new((0.7 * k as f64).sin(), (1.9 * k as f64).cos(), (2.3 * k as f64).sin());
+                place.rotation = Rotation3::from_scaled_axis(2.0 * wave).into_inner();
+                let off = Rotation3::from_scaled_axis(3e-3 * wave.yzx()).into_inner();
+                spot.rotation = Some(off * rotation_matrix(&sensor_from_base) * place.rotation);
+                place.point_mm += wave;
+            }
+            let state = state(&places);
+            // The turn by which a step of the search goes on from a start, rad.
+            let step_from = |start: &Transform| {
+                let normal = points.normal(&state, start);
+                solution(&normal.matrix, &normal.gradient).rows(0, 3).norm()
+            };
+            let mut by_points = points.clone();
+            by_points.oriented = false;
+            let (with, without) = (step_from(&points.start(&state)), step_from(&by_points.start(&state)));
+            assert!(with < 1e-7 && without > 1e-5, "{turn_rad} rad: {with} {without}");
         }
     }
 
     #[test]
     fn the_closed_form_is_the_best_only_where_points_weigh_alike() {
         let sensor_from_base = transform(Vector3::new(0.4, 0.2, -0.3), Vector3::new(10.0, -70.0, 900.0));
-        let (mut points, mut places) = along(30.0, sensor_from_base, sensor_from_base);
+        let (mut points, mut places) = along(30.0, sensor_from_base);
         for (k, (spot, place)) in points.spots.iter_mut().zip(&mut places).enumerate() {
             spot.weight = 0.2 + (0.9 * k as f64).sin().abs();
             spot.whitener = Matrix3::identity() * (7.0 * spot.weight);
@@ -333,9 +329,9 @@ mod tests {
         // The share of the residuals that a small rigid motion could still take away.
         let left = |points: &Points| {
             let state = State { places: places.clone(), extras: &[], scatter: &scatter };
-            let (residuals, design) = points.inner(&state, &points.start(&places));
+            let (residuals, design) = points.inner(&state, &points.start(&state));
             let share = (design.clone().qr().q().tr_mul(&residuals)).norm() / residuals.norm();
-            let normal = points.normal(&state, &points.start(&places));
+            let normal = points.normal(&state, &points.start(&state));
             let expected = Normal::new((residuals.clone(), design.clone()));
             assert!((&normal.matrix - &expected.matrix).amax() < 1e-9 * expected.matrix.amax());
             assert!((normal.cost / expected.cost - 1.0).abs() < 1e-9);
@@ -347,10 +343,8 @@ mod tests {
         assert!(!unlike.start_is_best() && left(&unlike) > 1e-6);
         let mut oriented = points.clone();
         oriented.oriented = true;
-        let mut with_unknown = points.clone();
-        with_unknown.spots[0].extra = Matrix3xX::zeros(1);
         let mut outlier = points.clone();
         outlier.spots[0].weight *= 2.0;
-        assert!([oriented, with_unknown, outlier].iter().all(|p| !p.start_is_best()));
+        assert!([oriented, outlier].iter().all(|p| !p.start_is_best()));
     }
 }

@@ -13,10 +13,9 @@ use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
 use super::points::Points;
 use super::smooth::Field;
-use super::starts::{first_anchor, frames_and_turn};
+use super::starts::{first_anchor, turn_on_flange};
 use super::state::State;
 use super::touch::{Contact, Touch};
-use crate::geometry::Transform;
 use crate::identify::data::dataset::{Dataset, Kind, KnownDistance, Reading};
 use crate::identify::data::targets::middle;
 use crate::identify::model::kinematics::{Kinematics, Place};
@@ -357,20 +356,17 @@ impl Inputs<'_> {
             .collect();
         let of_body = |spot: &Spot| spot.on_body_mm.is_some() && !self.task.set.are_on_flange();
         let turned = oriented || lists.iter().flatten().any(of_body);
-        let (frames, flange_from_target) = frames_and_turn(&lists, self.places, turned);
+        let flange_from_target = if turned { turn_on_flange(&lists, self.places) } else { Matrix3::identity() };
         let axis = |(k, e): (usize, &Extra)| if let Extra::Target(axis) = e { Some((k, *axis)) } else { None };
         let target: Vec<_> = self.task.extras.iter().enumerate().filter_map(axis).filter(|_| turned).collect();
-        let block = |(spots, sensor_from_base): (Vec<Spot>, Transform)| {
-            let target = target.clone();
-            let on_a_line = Points::are_on_a_line(&spots);
-            let mut points =
-                Points { spots, sensor_from_base, on_a_line, flange_from_target, oriented, target, field: None };
+        let block = |spots: Vec<Spot>| {
+            let mut points = Points { spots, flange_from_target, oriented, target: target.clone(), field: None };
             points.field = self.scatter.smooth.map(|error| {
                 let spots: Vec<_> = points.spots.iter().map(|s| (s.point_mm, s.whitener)).collect();
                 Box::new(Field::new(&spots, points.rows_a_spot(), error))
             });
             Block::Points(points)
         };
-        lists.into_iter().zip(frames).map(block).collect()
+        lists.into_iter().map(block).collect()
     }
 }

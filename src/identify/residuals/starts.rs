@@ -1,4 +1,4 @@
-//! Where the unknowns of a placement may be, before anything is fitted: a frame, how a body is turned on the flange, the anchor of a wire.
+//! Where the unknowns of a placement may be, before anything is fitted: how a body is turned on the flange, the anchor of a wire.
 //!
 //! In: what was measured, and the robot's places. Out: a start that gross errors hardly move, by reweighted least squares. What goes wrong: places on
 //! a line leave a turn about it, which stays where the decomposition puts it.
@@ -25,30 +25,25 @@ const TURN_ROUNDS: usize = 60;
 /// Change of a turn that ends the rounds, rad: a ten-thousandth of a millimetre at a metre.
 const TURN_STAYS_RAD: f64 = 1e-7;
 
-/// The frame of each placement, and how a body of several targets is turned on the flange. A pose that shows a part of the body says where it is only
-/// once the turn is known, and the turn is known from the frames: they are found from each other until neither moves.
-pub(super) fn frames_and_turn(lists: &[Vec<Spot>], places: &[Place], turned: bool) -> (Vec<Transform>, Matrix3<f64>) {
+/// How the target, or a body of several, is turned on the flange, with the frame of each placement unknown. A pose that shows a part of the body
+/// says where it is only once the turn is known, and the turn is known from the frames: they are found from each other until neither moves.
+pub(super) fn turn_on_flange(lists: &[Vec<Spot>], places: &[Place]) -> Matrix3<f64> {
     let frames_with = |turn: Option<&Matrix3<f64>>| -> Vec<Transform> {
         lists.iter().map(|spots| robust_frame(spots, places, turn)).collect()
     };
-    let mut frames = frames_with(None);
-    if !turned {
-        return (frames, Matrix3::identity());
-    }
-    let mut turn = mean_target(lists, &frames, places);
+    let mut turn = mean_target(lists, &frames_with(None), places);
     if !lists.iter().flatten().any(|spot| spot.on_body_mm.is_some()) {
-        return (frames, turn);
+        return turn;
     }
     for _ in 0..TURN_ROUNDS {
-        frames = frames_with(Some(&turn));
-        let next = mean_target(lists, &frames, places);
+        let next = mean_target(lists, &frames_with(Some(&turn)), places);
         let change = Rotation3::from_matrix_unchecked(next.transpose() * turn).angle();
         turn = next;
         if change < TURN_STAYS_RAD {
             break;
         }
     }
-    (frames, turn)
+    turn
 }
 
 /// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way). Without a body's turn its mark points come first.
