@@ -31,7 +31,7 @@ struct Bent {
 
 impl Camera {
     /// Projects a point (mm, in front of the camera) and differentiates. `None` at or behind the camera's plane.
-    #[inline]
+    #[inline(always)]
     pub fn project_with_derivatives(&self, point: &Point3<f64>) -> Option<Projection> {
         // A comparison with NaN is false, so this way round it is refused as well.
         let in_front = point.z > 0.0;
@@ -63,7 +63,7 @@ impl Camera {
         (bent.at, bent.by_ray)
     }
 
-    #[inline]
+    #[inline(always)]
     fn bend(&self, ray: &Point2<f64>) -> Bent {
         let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = self.distortion;
         let (x, y) = (ray.x, ray.y);

@@ -4,6 +4,8 @@
 //! fetched and stored once for four products. The order of summation depends on nothing but the rows, so that the bits do not
 //! depend on threads or on the processor.
 
+use crate::widest::widest;
+
 /// Most columns: a camera's 18, the rig's six, the board's three, the pose's six and the residual, rounded up.
 pub const WIDEST: usize = 36;
 
@@ -51,6 +53,14 @@ impl Products {
     }
 
     fn add(&mut self) {
+        widest(
+            #[inline(always)]
+            || self.add_rows(),
+        );
+    }
+
+    #[inline(always)]
+    fn add_rows(&mut self) {
         let [a, b, c, d] = &self.rows;
         for (i, sums) in self.sums[..self.width].iter_mut().enumerate() {
             let columns = i / 4 * 4..self.width;
