@@ -295,3 +295,20 @@ fn a_description_whose_declaration_does_not_stand_at_its_beginning_is_read() {
     let bad = at(&["robot", "import", "bad.urdf", "--out", "bad"]);
     assert!(bad.status.code() == Some(2) && stderr(&bad).contains("bad.urdf:11"), "{}", stderr(&bad));
 }
+
+/// The figures of a robot whose file has no tool are those of its absence: that is said, and nothing of one that has it.
+#[test]
+fn verify_says_which_tool_a_robot_asks_for() {
+    let folder = Folder(workplace());
+    let rows = world(40).1;
+    folder.file("m.csv", text("J1,J2,J3,J4,J5,J6,X,Y,Z", &rows, ",", joined));
+    let at = |arguments: &[&str]| stereocal(Path::new(folder.0.path()), arguments);
+    assert!(at(&["robot", "new", "paper"]).status.success());
+    let drawn = std::fs::read_to_string(folder.0.path().join("out/robot.toml")).expect("a robot");
+    let (links, _) = drawn.split_once("[tool]").expect("a tool");
+    for ([x, y, z], is_asked) in [([0.0, 0.0, 0.0], true), ([40.0, -25.0, 110.0], false)] {
+        folder.file("robot.toml", format!("{links}[tool]\nx_mm = {x:?}\ny_mm = {y:?}\nz_mm = {z:?}\n"));
+        let said = stdout(&at(&["verify", "--measurements", "m.csv", "--robot", "robot.toml"]));
+        assert_eq!(said.contains("robot.toml: with a tool of "), is_asked, "{said}");
+    }
+}
