@@ -235,8 +235,13 @@ impl Compensator {
     /// Readings where the robot was identified: those that the search reaches from the common posture, else the nearest to it.
     fn inside(&self, wanted: &Transform, posture: Option<&[f64]>) -> Option<Vec<f64>> {
         let (known, posture) = (self.known.as_ref()?, posture?);
+        // An arm of few joints may be at its place with its tool tilted.
+        let is_upright = |found: &Approach| {
+            self.identified.base_from_flange(&found.joints_rad).rotation.angle_to(&wanted.rotation) < MOST_TILT_RAD
+        };
         let arrived = |start: &[f64]| {
-            Some(self.approach(known, wanted, start)).filter(Approach::arrived).map(|found| found.joints_rad)
+            let found = Some(self.approach(known, wanted, start)).filter(|found| found.arrived() && is_upright(found));
+            found.map(|found| found.joints_rad)
         };
         let farthest = |readings: &[f64]| readings.iter().zip(posture).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         arrived(posture).or_else(|| {
