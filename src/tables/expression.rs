@@ -35,8 +35,8 @@ const VARIABLES: [&str; 5] = ["theta", "θ", "q", "th", "t"];
 /// The deepest brackets that are followed.
 const DEEPEST: usize = 20;
 
-/// What a joint's variable may be multiplied with: it stands there itself, or as degrees in radians or the other way.
-const OF_ONE: [f64; 3] = [1.0, PI / 180.0, 180.0 / PI];
+/// What a joint's variable may be multiplied with: it stands there itself, or as degrees in radians or mm in m, or the other way.
+const OF_ONE: [f64; 5] = [1.0, PI / 180.0, 180.0 / PI, 1e-3, 1e3];
 
 /// Rounding of such a factor, in parts of it.
 const ROUNDED: f64 = 1e-9;
