@@ -217,8 +217,8 @@ pub struct RobotImport {
     /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`
     #[arg(long, value_name = "FILE")]
     pub measurements: Vec<Utf8PathBuf>,
-    /// What a table's columns are, in their order: alpha,a,d,theta
-    #[arg(long, value_name = "NAME,NAME,...")]
+    /// What a table's columns are, in their order: alpha,a,d,theta; `-` skips one
+    #[arg(long, value_name = "NAME,NAME,...", allow_hyphen_values = true)]
     pub columns: Option<String>,
     /// Units of a table's angles and lengths: deg or rad, mm, cm, m, um or in [default: what the names say, else what the numbers and words around them show]
     #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]

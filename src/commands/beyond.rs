@@ -50,11 +50,25 @@ pub(super) fn outside(file: &Utf8Path, robot: &Robot, set: &Dataset, rows: &[usi
     Outside { joints, rows: rows.iter().copied().filter(is_outside).collect() }
 }
 
-/// By how much a joint's reading is outside of its range by more than new ones are that are drawn like the old ones; a joint that stood still comes
-/// back to half a degree (half a mm).
-fn off(joint: &Joint, (low, high): (f64, f64), q: f64) -> Option<f64> {
+/// By how much a joint's reading may be outside of its range, as new ones are that are drawn like the old ones; a joint that stood still comes back to
+/// half a degree (half a mm).
+fn usual(joint: &Joint, (low, high): (f64, f64)) -> f64 {
     let same = if joint.slides { 0.5 } else { 0.5f64.to_radians() };
-    Some((low - q).max(q - high)).filter(|off| *off > same.max(USUAL * (high - low)))
+    same.max(USUAL * (high - low))
+}
+
+/// By how much a joint's reading is outside of its range, where that is more.
+fn off(joint: &Joint, (low, high): (f64, f64), q: f64) -> Option<f64> {
+    Some((low - q).max(q - high)).filter(|off| *off > usual(joint, (low, high)))
+}
+
+/// Ranges of the joints outside of which a robot was not identified, rad (mm); `None` where nothing says what these were.
+pub(super) fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>> {
+    let widened = |(joint, (low, high)): (&Joint, (f64, f64))| {
+        let usual = usual(joint, (low, high));
+        (low - usual, high + usual)
+    };
+    Some(robot.joints.iter().zip(known::identified_over(file, robot)?).map(widened).collect())
 }
 
 /// The joints, from 0, outside of whose ranges many of these readings, rad (mm), are, and what is said of them; a `noun` is what has readings.
@@ -92,7 +106,7 @@ pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Op
         let joints = said.join(", ");
         (
             format!(
-                "of {all} many stand where the robot was not identified, and {what}: {joints}; identify it with poses around the targets"
+                "of {all} some stand where the robot was not identified, and {what}: {joints}; identify it with poses around the targets"
             ),
             far,
         )

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 use crate::geometry::{Transform, transform};
 use crate::robot::inverse::Approach;
-use crate::robot::{Robot, inverse};
+use crate::robot::{Joint, Robot, inverse};
 
 pub use refusal::Refusal;
 
@@ -38,6 +38,9 @@ const POSTURE_ROWS: usize = 20;
 /// Starts that a posture is looked for from, and those of a row that the common posture does not reach.
 const POSTURE_STARTS: usize = 64;
 const ROW_STARTS: usize = 8;
+
+/// Starts that a row has within the ranges that the robot was identified in.
+const KNOWN_STARTS: usize = 24;
 
 /// A target as it was written for the nominal robot.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,6 +74,8 @@ pub struct Compensator {
     identified: Robot,
     /// The identified robot with joints that go anywhere.
     unlimited: Robot,
+    /// The same with joints that stay where it was identified, where that is known.
+    known: Option<Robot>,
     /// The tools in the last frames. Weights hang where the files say, whichever tool is compensated.
     nominal_tool: Transform,
     identified_tool: Transform,
@@ -91,7 +96,20 @@ impl Compensator {
         unlimited.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
         let slides = identified.joints.iter().any(|j| j.slides);
         let reach_mm = if slides { f64::INFINITY } else { identified.reach_mm() };
-        Compensator { nominal, identified, unlimited, nominal_tool, identified_tool, reach_mm }
+        Compensator { nominal, identified, unlimited, known: None, nominal_tool, identified_tool, reach_mm }
+    }
+
+    /// The same that takes, for poses without readings, postures within these ranges, rad (mm), where there are any: those that the robot was
+    /// identified in.
+    #[must_use]
+    pub fn identified_over(mut self, ranges: &[(f64, f64)]) -> Compensator {
+        let both = |(joint, &(low, high)): (&Joint, &(f64, f64))| match joint.limits_rad {
+            Some((least, most)) if low.max(least) < high.min(most) => (low.max(least), high.min(most)),
+            limits => limits.unwrap_or((low, high)),
+        };
+        let ranges: Vec<(f64, f64)> = self.identified.joints.iter().zip(ranges).map(both).collect();
+        self.known = Some(self.identified.within(&ranges));
+        self
     }
 
     /// Where the nominal robot's tool is, `root_from_tool`.
@@ -115,13 +133,15 @@ impl Compensator {
         self.identified.ends.root_from_frame0.inverse() * root_from_tool * self.identified_tool.inverse()
     }
 
-    /// A posture for poses without any: the best one at the first of them that is reached.
+    /// A posture for poses without any: the best one at the first of them that is reached, where the robot was identified if one is.
     fn posture(&self, targets: &[Target]) -> Option<Vec<f64>> {
         let poses = targets.iter().filter_map(|target| match target {
             Target::Pose { root_from_tool, near_rad: None } => Some(self.base_from_flange(root_from_tool)),
             _ => None,
         });
-        poses.take(POSTURE_ROWS).find_map(|pose| inverse::best_posture(&self.identified, &pose, POSTURE_STARTS))
+        let poses: Vec<Transform> = poses.take(POSTURE_ROWS).collect();
+        let best = |robot: &Robot| poses.iter().find_map(|pose| inverse::best_posture(robot, pose, POSTURE_STARTS));
+        self.known.as_ref().and_then(best).or_else(|| best(&self.identified))
     }
 
     fn one(&self, target: &Target, posture: Option<&[f64]>) -> Compensated {
@@ -193,6 +213,9 @@ impl Compensator {
         if beyond > 0.0 {
             return Err(Refusal::OutOfReach { short_mm: beyond });
         }
+        if let Some(readings) = self.inside(wanted, posture) {
+            return Ok(readings);
+        }
         let starts = posture.map(<[f64]>::to_vec).into_iter();
         let starts = starts.chain((0..ROW_STARTS).map(|k| inverse::spread_start(&self.identified, k)));
         let mut nearest: Option<(f64, Vec<f64>)> = None;
@@ -207,6 +230,24 @@ impl Compensator {
         }
         let (miss_mm, start) = nearest.unwrap_or((f64::INFINITY, Vec::new()));
         Err(self.refusal(wanted, &start, miss_mm))
+    }
+
+    /// Readings where the robot was identified: those that the search reaches from the common posture, else the nearest to it.
+    fn inside(&self, wanted: &Transform, posture: Option<&[f64]>) -> Option<Vec<f64>> {
+        let (known, posture) = (self.known.as_ref()?, posture?);
+        // An arm of few joints may be at its place with its tool tilted.
+        let is_upright = |found: &Approach| {
+            self.identified.base_from_flange(&found.joints_rad).rotation.angle_to(&wanted.rotation) < MOST_TILT_RAD
+        };
+        let arrived = |start: &[f64]| {
+            let found = Some(self.approach(known, wanted, start)).filter(|found| found.arrived() && is_upright(found));
+            found.map(|found| found.joints_rad)
+        };
+        let farthest = |readings: &[f64]| readings.iter().zip(posture).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        arrived(posture).or_else(|| {
+            let others = (0..KNOWN_STARTS).filter_map(|k| arrived(&inverse::spread_start(known, k)));
+            others.min_by(|a, b| farthest(a).total_cmp(&farthest(b)))
+        })
     }
 
     /// What is in the way of the pose: a limit, where the robot would get there without its limits.
@@ -236,113 +277,4 @@ pub fn pose(numbers: &[f64]) -> Transform {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::robot::catalogue;
-    use crate::robot::corrections::{GravityTerm, HarmonicTerm, LoadPoint, Wave};
-
-    /// The contract's round trip.
-    const SAME_MM: f64 = 1e-3;
-    const SAME_RAD: f64 = 1e-6;
-
-    const BENT: [f64; 6] = [0.3, -1.2, 1.4, -0.9, -1.3, 0.4];
-
-    /// An arm that is off as machines are, with every kind of term.
-    fn real(nominal: &Robot) -> Robot {
-        let mut robot = nominal.clone();
-        for (k, joint) in robot.joints.iter_mut().enumerate() {
-            let s = (1.7 * k as f64).sin();
-            joint.alpha_rad += 2e-3 * s;
-            joint.beta_rad += 1e-3 * (1.0 - s);
-            joint.a_mm += 0.6 * s;
-            joint.theta_rad -= 4e-3 * s;
-            joint.d_mm += 0.4;
-        }
-        robot.tool_mm += Vector3::new(0.3, -0.2, 0.5);
-        robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(2), k_rad_per_m: 1e-3 }];
-        robot.corrections.harmonics = vec![HarmonicTerm { joint: 2, wave: Wave::Cos2, amplitude_rad: 5e-4 }];
-        robot
-    }
-
-    fn named(name: &str) -> Robot {
-        let mut robot = catalogue::robot(name).unwrap();
-        robot.tool_mm = Vector3::new(10.0, -20.0, 80.0);
-        robot
-    }
-
-    #[test]
-    fn the_real_tool_goes_where_the_nominal_one_was_meant_to_be() {
-        for name in ["ur5e", "abb-irb120", "kuka-iiwa14", "fanuc-lrmate200id", "paper"] {
-            let nominal = named(name);
-            let identified = real(&nominal);
-            let targets: Vec<Target> = (0..200)
-                .map(|k| inverse::spread_start(&nominal, k))
-                .filter(|q| inverse::freedom_mm(&nominal, q) > 15.0)
-                .map(Target::Readings)
-                .collect();
-            let compensator = Compensator::new(&nominal, &identified, None);
-            let compensated = compensator.compensate(&targets);
-            let mut done = 0;
-            for (target, found) in targets.iter().zip(&compensated) {
-                let Target::Readings(given) = target else { continue };
-                let Ok(readings) = &found.readings else { continue };
-                done += 1;
-                let off = compensator.meant(given).inverse() * compensator.reached(readings);
-                assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
-                assert!(found.miss_mm.unwrap() > 0.1);
-                assert!(readings.iter().zip(given).all(|(a, b)| (a - b).abs() < MOST_TURN_RAD));
-            }
-            assert!(done > targets.len() * 9 / 10 && done > 50, "{name}: {done} of {}", targets.len());
-        }
-    }
-
-    #[test]
-    fn poses_find_their_posture_and_the_posture_that_is_named_is_kept() {
-        let nominal = named("ur5e");
-        let identified = real(&nominal);
-        let compensator = Compensator::new(&nominal, &identified, None);
-        let root_from_tool = compensator.reached(&BENT);
-        let near_rad = Some(BENT.map(|v| v + 0.1).to_vec());
-        let named = compensator.compensate(&[Target::Pose { root_from_tool, near_rad }]);
-        let readings = named[0].readings.as_ref().unwrap();
-        assert!(readings.iter().zip(&BENT).all(|(a, b)| (a - b).abs() < 1e-6));
-        let free = compensator.compensate(&[Target::Pose { root_from_tool, near_rad: None }]);
-        let there = compensator.reached(free[0].readings.as_ref().unwrap());
-        assert!((there.translation.vector - root_from_tool.translation.vector).norm() < SAME_MM);
-    }
-
-    #[test]
-    fn what_is_in_the_way_is_named() {
-        let nominal = named("ur5e");
-        let mut identified = real(&nominal);
-        let said = |identified: &Robot, target: Target| {
-            Compensator::new(&nominal, identified, None).compensate(&[target])[0].readings.clone().unwrap_err()
-        };
-        let far = transform(Vector3::zeros(), Vector3::new(5000.0, 0.0, 0.0));
-        let there = said(&identified, Target::Pose { root_from_tool: far, near_rad: None });
-        assert!(matches!(there, Refusal::OutOfReach { short_mm } if short_mm > 1000.0), "{there}");
-        let stretched = said(&identified, Target::Readings(vec![0.3, -1.2, 0.0, -0.9, -1.3, 0.4]));
-        assert!(matches!(stretched, Refusal::OutOfReach { .. } | Refusal::Singular { .. }), "{stretched}");
-        identified.joints[3].limits_rad = Some((-0.5, 0.5));
-        let limited = said(&identified, Target::Readings(BENT.to_vec()));
-        assert!(matches!(limited, Refusal::Outside { joint: 4, .. }), "{limited}");
-        // A target that the nominal robot reaches and the real one only beyond a limit.
-        identified.joints[3].limits_rad = Some((-1.5, -0.899));
-        let limited = said(&identified, Target::Readings(BENT.to_vec()));
-        assert!(matches!(limited, Refusal::Limit { joint: 4, .. }), "{limited}");
-    }
-
-    /// A tool of its own replaces both; without it each file's own counts.
-    #[test]
-    fn one_tool_for_both() {
-        let nominal = named("ur5e");
-        let identified = real(&nominal);
-        let tool_mm = Vector3::new(0.0, 0.0, 150.0);
-        let compensator = Compensator::new(&nominal, &identified, Some(tool_mm));
-        let readings = compensator.compensate(&[Target::Readings(BENT.to_vec())])[0].readings.clone().unwrap();
-        let tool = Transform::from(tool_mm);
-        let at = |robot: &Robot, q: &[f64]| robot.base_from_flange(q) * tool;
-        let off = at(&nominal, &BENT).inverse() * at(&identified, &readings);
-        assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD);
-    }
-}
+mod tests;

@@ -12,7 +12,7 @@ use crate::csv_table::Table;
 use crate::diagnostic::count;
 use crate::files::Result;
 use crate::robot::Robot;
-use crate::tables::names::{Name, What};
+use crate::tables::names::{Name, What, words};
 use crate::tables::{Fields, Form};
 
 /// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side. Says
@@ -180,6 +180,11 @@ impl Taken<'_> {
         vec![pose, group, given("role").unwrap_or_else(|| "sample".to_owned())]
     }
 
+    /// Whether a column's name is one of the contract's.
+    fn is_own(&self, at: At) -> bool {
+        self.parts[at.part].meanings.as_ref().is_some_and(|meanings| matches!(meanings[at.column].what, What::Own(_)))
+    }
+
     fn targets_as_readings(&self) -> bool {
         are_readings(self.parts, &self.way.picked)
     }
@@ -223,8 +228,12 @@ impl Taken<'_> {
         );
         text.push_str(&self.form());
         let own = self.own();
-        if !own.contains_key("pose") {
-            text.push_str("; pose = row");
+        match own.get("pose") {
+            None => text.push_str("; pose = row"),
+            Some(at) if self.parts[at.part].key == Some(at.column) && !self.is_own(*at) => {
+                let _ = write!(text, "; pose = {}", self.parts[at.part].column_name(at.column));
+            }
+            Some(_) => {}
         }
         if let Some(number) = self.number.filter(|_| !own.contains_key("group")) {
             let _ = write!(text, "; group = {number}");
@@ -266,7 +275,7 @@ impl Taken<'_> {
             |name: &String| name.ends_with("_rad2") || ["fit_rms_mm", "corners", "status"].contains(&name.as_str());
         let picked = &self.way.picked;
         let taken: Vec<At> = picked.columns().chain(picked.distance).chain(self.own().into_values()).collect();
-        let mut left = Vec::new();
+        let (mut left, mut turned) = (Vec::new(), false);
         let whole = |part: usize| self.parts.len() > 1 && taken.iter().all(|at| at.part != part);
         let idle = (0..self.parts.len()).filter(|&part| whole(part));
         left.extend(idle.map(|part| format!("all of {}", self.parts[part].file_name())));
@@ -280,17 +289,31 @@ impl Taken<'_> {
                 };
                 is_told && !taken.contains(&at)
             };
-            let names = (0..file.width()).filter(is_left).map(|column| file.column_name(column));
+            let columns: Vec<usize> = (0..file.width()).filter(is_left).collect();
+            turned |= columns.iter().any(|column| turns(file, *column));
+            let names = columns.into_iter().map(|column| file.column_name(column));
             left.extend(names.filter(|name| !of_measure(name)));
         }
+        let read = if turned { " (an orientation is read from rx_rad, ry_rad, rz_rad, a rotation vector)" } else { "" };
         match left.len() {
             0 => String::new(),
             n if n > NAMED => {
-                format!("; not used: {} and {}", left[..NAMED].join(", "), count(n - NAMED, "more column"))
+                format!("; not used: {} and {}{read}", left[..NAMED].join(", "), count(n - NAMED, "more column"))
             }
-            _ => format!("; not used: {}", left.join(", ")),
+            _ => format!("; not used: {}{read}", left.join(", ")),
         }
     }
+}
+
+/// Words of columns that say how a target is turned.
+const TURNS: [&str; 15] =
+    ["rx", "ry", "rz", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw", "euler", "quat", "quaternion", "rotvec", "rvec"];
+
+/// Whether a column's name is of an orientation, an entry of a matrix included.
+fn turns(file: &Part, column: usize) -> bool {
+    let is_entry = file.meanings.as_ref().is_some_and(|meanings| matches!(meanings[column].what, What::Matrix(..)));
+    let name = file.names.as_ref().and_then(|names| names.get(column));
+    is_entry || name.is_some_and(|name| words(name).0.iter().any(|word| TURNS.contains(&word.as_str())))
 }
 
 /// Whether a column has a few words, each in several rows, as places and sessions have: it may be the group that the user means.

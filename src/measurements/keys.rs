@@ -30,11 +30,7 @@ impl Key {
             return None;
         }
         let own = file.meanings.iter().flatten().position(|name| name.what == What::Own("pose"));
-        let naming = |name: &String| {
-            let words = words(name).0;
-            !words.is_empty() && words.iter().all(|word| NAMING.split(' ').any(|known| known == word))
-        };
-        let named = own.or_else(|| file.names.iter().flatten().position(naming));
+        let named = own.or_else(|| file.names.iter().flatten().position(|name| is_naming(name)));
         let bare = file.names.as_ref().is_none_or(|names| names[0].is_empty());
         // Without names of columns what a row belongs to may stand before its label.
         let labels = (1..file.width()).filter(|&column| file.names.is_none() && file.kinds[column] == Kind::Words);
@@ -94,6 +90,22 @@ fn names(file: &Part, column: usize) -> Option<Vec<String>> {
     let plain = |cell: &&str| (!cell.is_empty()).then(|| (*cell).to_owned());
     let all = |of: &dyn Fn(&&str) -> Option<String>| cells.iter().map(of).collect::<Option<Vec<String>>>();
     all(&number).or_else(|| all(&whole)).or_else(|| all(&plain))
+}
+
+/// The column of words by which a table calls its rows, each by one of its own: `Name`, `Point`.
+pub(super) fn label(part: &Part) -> Option<usize> {
+    let is_label = |column: &usize| {
+        let cells: BTreeSet<&str> = part.rows.iter().map(|(_, row)| row[*column].trim()).collect();
+        part.kinds[*column] == Kind::Words && cells.len() == part.rows.len() && !cells.contains("")
+    };
+    let named = part.names.iter().flatten().enumerate().filter(|(_, name)| is_naming(name));
+    named.map(|(column, _)| column).filter(|_| part.times == 1).find(is_label)
+}
+
+/// Whether a column's name says that it numbers or names the rows.
+fn is_naming(name: &str) -> bool {
+    let words = words(name).0;
+    !words.is_empty() && words.iter().all(|word| NAMING.split(' ').any(|known| known == word))
 }
 
 /// Puts the rows of all files that name them in one order; says what was done where they stand otherwise.

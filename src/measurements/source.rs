@@ -108,6 +108,10 @@ impl Source {
         for (number, mut set) in sets.into_iter().enumerate() {
             let joined = keys::align(&mut set)?;
             let widened = assemble::widen(&mut set)?;
+            // A column that a flag skips names nothing.
+            if self.columns.is_none() && set.iter().all(|part| part.key.is_none()) {
+                set.iter_mut().for_each(|part| part.key = keys::label(part));
+            }
             let (way, basis) = self.way(&set, robot, widened)?;
             let taken = Taken { parts: &set, way: &way, basis, robot, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);

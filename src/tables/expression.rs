@@ -1,7 +1,8 @@
 //! Numbers as formulas have them: `pi/2`, `-np.pi / 2`, `deg2rad(90)`, `135*mm`, `q2 - 90°`.
 //!
 //! In: text, and what its names stand for. Out: the number, whether it was written with pi, and whether a joint's variable is part of it, which
-//! counts as zero. What goes wrong: a name that stands for nothing, a joint's variable that counts the other way, or anything that is no sum of products; there is no number then.
+//! counts as zero. What goes wrong: a name that stands for nothing, a multiple of a joint's variable or several of them, or anything that is no sum of
+//! products; there is no number then. Nor is there one where the joint counts the other way, unless that is asked for.
 
 use std::f64::consts::PI;
 
@@ -34,8 +35,26 @@ const VARIABLES: [&str; 5] = ["theta", "θ", "q", "th", "t"];
 /// The deepest brackets that are followed.
 const DEEPEST: usize = 20;
 
+/// What a joint's variable may be multiplied with: it stands there itself, or as degrees in radians or mm in m, or the other way.
+const OF_ONE: [f64; 5] = [1.0, PI / 180.0, 180.0 / PI, 1e-3, 1e3];
+
+/// Rounding of such a factor, in parts of it.
+const ROUNDED: f64 = 1e-9;
+
 /// Evaluates a formula; `known` says what a name stands for.
 pub fn evaluate(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<Value> {
+    let (value, slope) = with_slope(text, known)?;
+    // A joint that counts the other way, `-q2`, is another one.
+    (!value.variable || slope > 0.0).then_some(value)
+}
+
+/// The same of a formula in which a joint's variable counts the other way, `90 - q2`; none of others.
+pub fn counted_back(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<Value> {
+    with_slope(text, known).filter(|(value, slope)| value.variable && *slope < 0.0).map(|(value, _)| value)
+}
+
+/// A formula's value, and what a joint's variable in it is multiplied with.
+fn with_slope(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<(Value, f64)> {
     let plain = plain(text);
     let at = |reading: f64| {
         let mut parser = Parser { rest: plain.trim(), known, reading, radians: false, variable: false };
@@ -44,8 +63,9 @@ pub fn evaluate(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<Val
         whole.then_some(Value { number, radians: parser.radians, variable: parser.variable })
     };
     let value = at(0.0)?;
-    // A joint that counts the other way, `-q2`, is another one.
-    (!value.variable || at(1.0)?.number > value.number).then_some(value)
+    let slope = at(1.0)?.number - value.number;
+    let is_one = OF_ONE.iter().any(|one| (slope.abs() - one).abs() < ROUNDED * one);
+    (!value.variable || is_one).then_some((value, slope))
 }
 
 /// Without the marks of HTML and LaTeX: `θ<sub>2</sub>`, `\\theta_2`.
@@ -278,6 +298,8 @@ mod tests {
             "a1",
             "-q2",
             "90 - theta_3",
+            "q2 + q3",
+            "2*q2",
             "cos(q1)",
             "sin",
             "sin(",
@@ -295,6 +317,14 @@ mod tests {
             "1e999",
         ] {
             assert_eq!(of(text), None, "{text}");
+        }
+        let back = |text: &str| counted_back(text, &|_| None).map(|v| (v.number, v.radians));
+        assert_eq!([back("-q2"), back("90 - theta_3")], [Some((0.0, false)), Some((90.0, false))]);
+        assert!(
+            back("pi/2 - deg2rad(q4)").is_some_and(|(number, radians)| (number - PI / 2.0).abs() < 1e-12 && radians)
+        );
+        for text in ["q2", "90", "-90", "-q2 - q3", "-2*q2", "q2 - q2", "a - q2"] {
+            assert_eq!(back(text), None, "{text}");
         }
         assert_eq!(of(&"(".repeat(10_000)), None);
         assert_eq!(of(&format!("{}1", "-".repeat(10_000))), None);

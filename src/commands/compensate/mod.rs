@@ -10,7 +10,7 @@ use camino::Utf8Path;
 use super::heed::heed;
 use super::{Outcome, Result};
 use crate::cli::Compensate;
-use crate::compensate::{Compensator, Target};
+use crate::compensate::{Compensated, Compensator, Target};
 use crate::config::{self, Config};
 use crate::diagnostic::Status;
 use crate::files::OutDir;
@@ -47,8 +47,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&["compensated.csv", "compensate.json"])?;
     tell_of_postures(&rows);
     doubts::warn(&rows, &pair.identified);
-    let list: Vec<_> = rows.iter().map(|row| row.target.clone()).collect();
-    let found = Compensator::new(nominal, &pair.identified, pair.tool_mm).compensate(&list);
+    let found = compensated(args, &pair, &rows);
     let in_file = |readings: &[f64]| -> Vec<f64> {
         readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()
     };
@@ -80,12 +79,22 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     })
 }
 
+/// Readings for all rows; those without a posture get one where the robot was identified, if there is one.
+fn compensated(args: &Compensate, pair: &Pair, rows: &[Row]) -> Vec<Compensated> {
+    let list: Vec<Target> = rows.iter().map(|row| row.target.clone()).collect();
+    let compensator = Compensator::new(&pair.nominal, &pair.identified, pair.tool_mm);
+    match super::beyond::identified_over(&args.identified, &pair.identified) {
+        Some(ranges) => compensator.identified_over(&ranges).compensate(&list),
+        None => compensator.compensate(&list),
+    }
+}
+
 /// Where no row says the posture.
 fn tell_of_postures(rows: &[Row]) {
     if rows.iter().any(|row| matches!(row.target, Target::Pose { near_rad: None, .. })) {
         progress::note(
-            "poses without readings: of all postures the one farthest from limits and singular ones is taken; columns j1_deg.. beside a pose say \
-             another",
+            "poses without readings: of the postures where the robot was identified, or else of all, the one farthest from limits and singular ones \
+             is taken; columns j1_deg.. beside a pose say another",
         );
     }
 }

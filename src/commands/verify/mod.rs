@@ -37,9 +37,19 @@ struct Verified {
 struct RobotVerified {
     file: String,
     verify: PointSpread,
+    /// The tool that the robot's links ask for, where they come several times nearer with it than with that of the file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    asked_tool: Option<AskedTool>,
     /// The same without the strays; absent without any.
     #[serde(skip_serializing_if = "Option::is_none")]
     verify_without_strays: Option<PointSpread>,
+}
+
+#[derive(Debug, Serialize)]
+struct AskedTool {
+    tool_mm: [f64; 3],
+    /// Middle position error with it.
+    left_mm: f64,
 }
 
 impl RobotVerified {
@@ -51,8 +61,10 @@ impl RobotVerified {
         };
         let near = |rows: &[usize]| rows.iter().copied().filter(|row| !far.contains(row)).collect::<Vec<usize>>();
         let without = || of(&Judge { fitted: &near(judge.fitted), ..judge.clone() }, &near(judged));
+        let asked_tool = record::asked_tool(judge.set, robot);
         RobotVerified {
             file: file.to_string(),
+            asked_tool: asked_tool.map(|(tool_mm, left_mm)| AskedTool { tool_mm, left_mm }),
             verify: of(judge, judged),
             verify_without_strays: (!far.is_empty()).then(without),
         }
@@ -193,7 +205,14 @@ fn table(robots: &[RobotVerified], folded: bool, strays: &[String]) -> String {
             robots.iter().filter_map(|robot| Some((robot.file.as_str(), figures(robot)?))).collect();
         report::identify::verified(&rows, folded)
     };
-    let all = of(|robot| Some(&robot.verify));
+    let mut all = of(|robot| Some(&robot.verify));
+    for RobotVerified { file, asked_tool, .. } in robots {
+        let Some(AskedTool { tool_mm: [x, y, z], left_mm }) = asked_tool else { continue };
+        all += &format!(
+            "{file}: with a tool of {x:.1}, {y:.1}, {z:.1} mm instead of the file's it is off by {left_mm:.3} mm (median); the figures above have \
+             the tool of the file\n"
+        );
+    }
     match strays {
         [] => all,
         rows => {

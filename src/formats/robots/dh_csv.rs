@@ -10,6 +10,7 @@ mod beside;
 mod front;
 mod latex;
 mod names;
+mod offsets;
 mod reading;
 mod table;
 mod units;
@@ -19,11 +20,14 @@ use std::fmt::Write as _;
 pub use self::front::{Asked, readings};
 pub use self::reading::Reading;
 pub use self::units::Open;
-use crate::robot::Robot;
+use crate::robot::{Joint, Robot};
 
 /// The modified table of a robot: what a table can carry.
 pub fn to_csv(robot: &Robot) -> String {
-    let beta = robot.joints.iter().any(|j| j.beta_rad != 0.0);
+    // Where its ends look like those of a classic table, the column says which it is.
+    let twists = |joint: Option<&Joint>| joint.is_some_and(|j| j.alpha_rad != 0.0);
+    let as_classic = twists(robot.joints.first()) && !twists(robot.joints.last());
+    let beta = as_classic || robot.joints.iter().any(|j| j.beta_rad != 0.0);
     let limits = robot.joints.iter().any(|j| j.limits_rad.is_some());
     let mut text = "alpha_deg,a_mm,theta_deg,d_mm".to_owned();
     text.push_str(if beta { ",beta_deg" } else { "" });

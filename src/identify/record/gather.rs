@@ -78,7 +78,7 @@ impl Record {
             repeats: set.repeats.clone(),
             certainty: certainty(&found.judged, &found.terms),
             folded: !found.deletions.is_empty(),
-            tool_mm: tool(set, nominal),
+            tool_mm: asked_tool(set, nominal),
             sensor: found.extras.iter().filter(|_| !set.are_on_flange()).map(|(e, v)| of_sensor(set, *e, *v)).collect(),
         };
         record.advise(set, nominal, found, &findings, found.against_nominal(set, nominal, settings));
@@ -86,9 +86,9 @@ impl Record {
     }
 }
 
-/// The tool that the nominal chain asks for, where it makes it far nearer to the points of the placement with most rows, or brings touches far
-/// nearer to each other.
-fn tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
+/// The tool that a chain asks for, mm, and what it leaves with it (mm, median), where it makes it far nearer to the points of the placement with most
+/// rows, or brings touches far nearer to each other.
+pub fn asked_tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     /// Times that the chain must come nearer by a tool of its own.
     const FAR_NEARER: f64 = 3.0;
     if let Some(touched) = Touched::new(set, nominal) {

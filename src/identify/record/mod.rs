@@ -14,6 +14,7 @@ mod touched;
 pub use crate::robot::Advice;
 pub use file::{Record, Smooth};
 pub use findings::Findings;
+pub use gather::asked_tool;
 pub use parameters::{Identifiability, MethodRecord, ParameterRecord};
 pub use plausible::links_apart;
 pub use quality::{PointSpread, Quality, quality, spread};

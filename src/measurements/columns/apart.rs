@@ -79,6 +79,22 @@ fn of_way(parts: &[Part], way: &Way, robot: &Robot) -> Option<Apart> {
 }
 
 impl Apart {
+    /// The column `pose`, where a name in it has rows of several values.
+    fn names_again(&self, parts: &[Part]) -> Option<At> {
+        let of_part = |(part, p): (usize, &Part)| {
+            let column = p.meanings.as_ref()?.iter().position(|name| name.what == What::Own("pose"))?;
+            Some(At { part, column })
+        };
+        let pose = parts.iter().enumerate().find_map(of_part)?;
+        let mut value_of: BTreeMap<&str, &str> = BTreeMap::new();
+        let mut rows = parts[pose.part].rows.iter().zip(&parts[self.at.part].rows);
+        let is_other = rows.any(|((_, names), (_, values))| {
+            let value = &values[self.at.column];
+            *value_of.entry(&names[pose.column]).or_insert(value) != value
+        });
+        is_other.then_some(pose)
+    }
+
     /// That the table's owner must say what the column is.
     pub fn asked(&self, parts: &[Part]) -> Error {
         const SHOWN: usize = 4;
@@ -92,7 +108,12 @@ impl Apart {
             self.values.len(),
             self.apart_mm
         );
-        let flag = |name: &str| columns_flag(parts, &self.joints, &self.points, Some((self.at, name)));
+        let flag = |name: &str| {
+            let mut named = vec![(self.at, name)];
+            // Names that come again at another place are none of poses.
+            named.extend(self.names_again(parts).filter(|_| name == "group").map(|pose| (pose, "-")));
+            columns_flag(parts, &self.joints, &self.points, &named)
+        };
         let hint = format!(
             "`--columns {}` if it says which target was measured, `--columns {}` if it says where the robot or the sensor stood",
             flag("target"),

@@ -45,7 +45,7 @@ pub(in crate::measurements) struct Part {
     /// Line and cells, all of one length.
     pub rows: Vec<(u64, Fields)>,
     pub kinds: Vec<Kind>,
-    /// The column by which rows were joined with those of another file.
+    /// The column by which rows were joined with those of another file, or by which the table calls them.
     pub key: Option<usize>,
     /// Rows of the file that stand side by side in each row here.
     pub times: usize,

@@ -185,7 +185,7 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
         let message = format!("two sets of joints would do: {} and {}", listed(parts, first), listed(parts, second));
         // Nothing of the points where they are not clear.
         let points: Vec<At> = points(parts).into_iter().flatten().flat_map(|(_, at, _)| at).collect();
-        let flag = |joints: &[At]| columns_flag(parts, joints, &points, None);
+        let flag = |joints: &[At]| columns_flag(parts, joints, &points, &[]);
         let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(first), flag(second));
         return Err(parts[first[0].part].refuse(message, Some(&hint)));
     }
@@ -347,7 +347,7 @@ pub(in crate::measurements) fn asked(
         listed(parts, first),
         listed(parts, second)
     );
-    let flag = |points: &[At]| columns_flag(parts, joints, points, None);
+    let flag = |points: &[At]| columns_flag(parts, joints, points, &[]);
     let both = if readings {
         format!(", `--columns {}` both as readings of one point", flag(&[*first, *second].concat()))
     } else {
@@ -357,12 +357,13 @@ pub(in crate::measurements) fn asked(
     parts[first[0].part].refuse(message, Some(&hint))
 }
 
-/// What `--columns` must say to take these columns, and one `more` by its name; joints or points that names say are added.
+/// What `--columns` must say to take these columns, and one `more` by its name, which may be `-`; joints or points that names say are added, and the
+/// columns of the measurements' own format, the rows' names and placements among them, keep theirs.
 pub(in crate::measurements) fn columns_flag(
     parts: &[Part],
     joints: &[At],
     points: &[At],
-    more: Option<(At, &str)>,
+    more: &[(At, &str)],
 ) -> String {
     let mut named: Vec<(usize, At)> =
         groups(parts, joint_number).into_iter().map(|g| g.columns).max_by_key(Vec::len).unwrap_or_default();
@@ -382,8 +383,12 @@ pub(in crate::measurements) fn columns_flag(
             let joint = named_joints.iter().position(|j| *j == at).map(|i| format!("j{}", i + 1));
             let number = |i: usize| if points.len() > 3 { (i / 3 + 1).to_string() } else { String::new() };
             let point = points.iter().position(|p| *p == at).map(|i| ["x", "y", "z"][i % 3].to_owned() + &number(i));
-            let more = more.filter(|(column, _)| *column == at).map(|(_, name)| name.to_owned());
-            words.push(joint.or(point).or(more).unwrap_or_else(|| "-".to_owned()));
+            let more = more.iter().find(|(column, _)| *column == at).map(|(_, name)| (*name).to_owned());
+            let own = file.meanings.as_ref().and_then(|meanings| match meanings[column].what {
+                What::Own(name) => Some(name.to_owned()),
+                _ => None,
+            });
+            words.push(joint.or(point).or(more).or(own).unwrap_or_else(|| "-".to_owned()));
         }
     }
     while words.last().is_some_and(|word| word == "-") {

@@ -154,7 +154,7 @@ pub(in crate::measurements) fn open(parts: &[Part], a: &Way, b: &Way) -> Error {
         _ => {
             let [first, second] = [a, b].map(|way| listed(parts, &way.picked.joints));
             let message = format!("two sets of joints would do, {first} and {second}");
-            let flag = |way: &Way| columns_flag(parts, &way.picked.joints, &way.picked.all_points(), None);
+            let flag = |way: &Way| columns_flag(parts, &way.picked.joints, &way.picked.all_points(), &[]);
             let hint = format!("`--columns {}` takes the first, `--columns {}` the second", flag(a), flag(b));
             parts[0].refuse(message, Some(&hint))
         }

@@ -29,6 +29,7 @@ pub fn summary(
     let before = record.before.judged();
     let after = record.chosen_method().map(|m| m.quality.judged());
     let mut lines = vec![advice(record), format!("before: {}", errors(before))];
+    lines.extend(of_tool(record));
     if is_corrected(record) {
         lines.push(format!("after: {}; {}", after.map_or_else(|| "n/a".to_owned(), errors), judged_on(record)));
     }
@@ -40,7 +41,6 @@ pub fn summary(
     lines.push(kept(record));
     lines.extend(others(record).or(record.not_run.clone()));
     lines.extend(sure(record));
-    lines.extend(of_tool(record));
     lines.extend(record.repeats.as_ref().map(|repeats| repeats.sentence()));
     lines.extend(record.targets.as_ref().map(|targets| targets.sentence()));
     lines.extend(record.scale.filter(|scale| !scale.is_significant()).map(|scale| scale.sentence()));

@@ -106,6 +106,87 @@ fn places_of_the_robot_are_asked_about_and_confirmed_one_at_a_time() {
 }
 
 #[test]
+fn flags_that_are_named_keep_the_names_of_poses() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(36);
+    let all = of_reflectors(&rows);
+    let cells = |cells: &[f64]| cells.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let mut table = "pose,SMR,j1,j2,j3,j4,j5,j6,x,y,z\n".to_owned();
+    for (i, ((q, _), points)) in rows.iter().zip(&all).enumerate() {
+        for k in 0..3 {
+            let _ = writeln!(table, "p{i},{},{},{}", ["A", "B", "C"][k], cells(q), cells(&points[3 * k..3 * k + 3]));
+        }
+    }
+    let file = folder.file("smr.csv", table);
+    let columns = "pose,target,j1,j2,j3,j4,j5,j6,x,y,z";
+    // As places these rows would have one pose at several of them.
+    let as_target = format!("`--columns {columns}` if");
+    refused(&source(&[&file]), &robot, &[&as_target, "`--columns -,group,j1,j2,j3,j4,j5,j6,x,y,z` if"]);
+    let named = Source { files: vec![file], columns: Some(columns.to_owned()), units: None };
+    let (found, said) = named.read(&robot).expect("named");
+    assert!(found.len() == 108 && found[4].at.pose == "p1" && found[4].target == "B", "{:?}", found[4]);
+    assert!(!said[0].contains("pose = row"), "{said:?}");
+    let moved = |(i, (q, [x, y, z])): (usize, &(Vec<f64>, [f64; 3]))| {
+        let k = i % 3;
+        format!("p{i},{k},{},{}\n", cells(q), cells(&[*x, y + 400.0 * k as f64, *z]))
+    };
+    let places: String = rows.iter().enumerate().map(moved).collect();
+    let file = folder.file("places.csv", format!("pose,E,J1,J2,J3,J4,J5,J6,X,Y,Z\n{places}"));
+    refused(&source(&[&file]), &robot, &["`--columns pose,group,j1,j2,j3,j4,j5,j6,x,y,z` if"]);
+}
+
+#[test]
+fn rows_have_the_names_of_the_table() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(20);
+    let numbers = text("", &rows, ",", joined);
+    let file = |head: &str, name: &dyn Fn(usize) -> String| {
+        let lines: String = numbers.lines().enumerate().map(|(i, line)| format!("{},{line}\n", name(i))).collect();
+        folder.file("named.csv", format!("{head},J1,J2,J3,J4,J5,J6,X,Y,Z\n{lines}"))
+    };
+    let named = |head: &str, name: &dyn Fn(usize) -> String| {
+        let (found, said) = source(&[&file(head, name)]).read(&robot).expect(head);
+        (found[3].at.pose.clone(), said[0].clone())
+    };
+    let words = |i: usize| format!("Pose left {}", i + 1);
+    for head in ["Name", "Point ID"] {
+        let (pose, said) = named(head, &words);
+        assert!(pose == "Pose left 4" && said.contains(&format!("; pose = {head}")), "{pose}: {said}");
+    }
+    // A remark, a name that comes again, one that is lacking, and a column that a flag skips.
+    let lacking = |i: usize| if i == 7 { String::new() } else { words(i) };
+    for (head, name) in
+        [("Remark", &words as &dyn Fn(usize) -> String), ("Name", &|i| words(i / 2)), ("Name", &lacking)]
+    {
+        let (pose, said) = named(head, name);
+        assert!(pose == "4" && said.contains("; pose = row"), "{head}: {pose}: {said}");
+    }
+    let columns = Some("-,j1,j2,j3,j4,j5,j6,x,y,z".to_owned());
+    let skipped = Source { files: vec![file("Name", &words)], columns, units: None };
+    assert_eq!(skipped.read(&robot).expect("skipped").0[3].at.pose, "4");
+}
+
+#[test]
+fn orientations_in_other_forms_are_said_to_be_none_that_are_read() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(20);
+    let said = |more: &str| {
+        let count = more.split(',').count();
+        let line = |q: &[f64], p: &[f64; 3]| {
+            [q.to_vec(), p.to_vec(), (0..count).map(|k| (q[0] + k as f64).sin()).collect()].concat()
+        };
+        let table = text(&format!("J1,J2,J3,J4,J5,J6,X,Y,Z,{more}"), &rows, ",", line);
+        source(&[&folder.file("turned.csv", table)]).read(&robot).expect(more).1[0].clone()
+    };
+    for more in ["qw,qx,qy,qz", "r11,r12,r13,r21,r22,r23,r31,r32,r33", "Rx [deg],Ry [deg],Rz [deg]"] {
+        assert!(said(more).contains(" (an orientation is read from rx_rad, ry_rad, rz_rad"), "{more}: {}", said(more));
+    }
+    for more in ["rms,temp", "rx_rad,ry_rad,rz_rad"] {
+        assert!(!said(more).contains("an orientation is"), "{more}: {}", said(more));
+    }
+}
+
+#[test]
 fn transforms_one_below_the_other_are_a_row_each() {
     let folder = Folder(workplace());
     let (robot, rows) = world(30);
@@ -213,4 +294,30 @@ fn a_description_whose_declaration_does_not_stand_at_its_beginning_is_read() {
     );
     let bad = at(&["robot", "import", "bad.urdf", "--out", "bad"]);
     assert!(bad.status.code() == Some(2) && stderr(&bad).contains("bad.urdf:11"), "{}", stderr(&bad));
+}
+
+/// The figures of a robot whose file has no tool are those of its absence: that is said, and nothing of one that has it.
+#[test]
+fn verify_says_which_tool_a_robot_asks_for() {
+    let folder = Folder(workplace());
+    let rows = world(40).1;
+    folder.file("m.csv", text("J1,J2,J3,J4,J5,J6,X,Y,Z", &rows, ",", joined));
+    let at = |arguments: &[&str]| stereocal(Path::new(folder.0.path()), arguments);
+    assert!(at(&["robot", "new", "paper"]).status.success());
+    let drawn = std::fs::read_to_string(folder.0.path().join("out/robot.toml")).expect("a robot");
+    let (links, _) = drawn.split_once("[tool]").expect("a tool");
+    for ([x, y, z], is_asked) in [([0.0, 0.0, 0.0], true), ([40.0, -25.0, 110.0], false)] {
+        folder.file("robot.toml", format!("{links}[tool]\nx_mm = {x:?}\ny_mm = {y:?}\nz_mm = {z:?}\n"));
+        let said = stdout(&at(&["verify", "--measurements", "m.csv", "--robot", "robot.toml"]));
+        assert_eq!(said.contains("robot.toml: with a tool of "), is_asked, "{said}");
+    }
+}
+
+#[test]
+fn columns_of_a_robots_table_may_begin_with_one_that_is_skipped() {
+    let folder = Folder(workplace());
+    folder.file("dh.csv", "5,90,0,310,0\n7,0,425,0,-90\n9,0,80,0,0\n");
+    let arguments = ["robot", "import", "dh.csv", "--columns", "-,alpha,a,d,theta"];
+    let read = stereocal(Path::new(folder.0.path()), &arguments);
+    assert!(read.status.success() && stdout(&read).contains("425.0000"), "{}", stderr(&read));
 }

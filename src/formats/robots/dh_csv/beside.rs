@@ -45,8 +45,8 @@ fn side(name: &str) -> Option<i32> {
     const BESIDE: &str = "q theta \u{3b8} joint angle limit limits lim range position pos deg rad degree degrees j i";
     let words = names::words(name).0;
     let of = |word: &str| match word {
-        "min" | "lower" | "low" | "minimum" => Some(-1),
-        "max" | "upper" | "high" | "maximum" => Some(1),
+        "min" | "qmin" | "lower" | "low" | "minimum" => Some(-1),
+        "max" | "qmax" | "upper" | "high" | "maximum" => Some(1),
         _ => None,
     };
     let mut sides = words.iter().filter_map(|word| of(word));

@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use camino::Utf8Path;
 
 use super::latex;
-use super::names::{HINT, named};
+use super::names::HINT;
+use super::offsets;
 use super::reading::{Reading, reading};
 use super::table::Table;
 use crate::files::{self, Result};
@@ -136,7 +137,7 @@ fn table<'a>(
 /// The one way to read a table with names, or all of one without.
 fn ways(table: &Table) -> Result<Vec<Reading>> {
     match table.names {
-        Some(names) => Ok(vec![reading(table, named(table.grid, names)?)?]),
+        Some(names) => Ok(vec![reading(table, offsets::columns(table, names)?)?]),
         None => without_names(table),
     }
 }
@@ -203,7 +204,8 @@ fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Readi
 /// Whether a cell is a number or a formula; a name alone, `theta`, is of a column.
 fn is_number(cell: &str) -> bool {
     header::is_number(cell)
-        || cell.contains(|c: char| c.is_ascii_digit() || c == '/') && expression::evaluate(cell, &|_| None).is_some()
+        || cell.contains(|c: char| c.is_ascii_digit() || c == '/')
+            && expression::evaluate(cell, &|_| None).or_else(|| expression::counted_back(cell, &|_| None)).is_some()
 }
 
 /// Links whose parameters a text names.

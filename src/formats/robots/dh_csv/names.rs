@@ -8,6 +8,9 @@ use crate::tables::names::{self, Unit};
 pub(super) const HINT: &str =
     "a row a joint, from the base: alpha_deg,a_mm,theta_deg,d_mm (deg and mm), or alpha, a, d, theta in any order";
 
+/// What settles which column is which.
+pub(super) const BY_FLAG: &str = "`--columns NAME,NAME,...` names the columns in their order: alpha, a, theta and d where they are these, `-` for others";
+
 /// What the columns of a row are called, in the order of a row: alpha, a, theta, d.
 pub(super) const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
 
@@ -37,10 +40,19 @@ pub(super) fn named(grid: &Grid, names: &[String]) -> Result<[usize; 4]> {
     let (alpha, a, theta, d) = (alpha?, a?, theta?, d?);
     if plain(&names[a]).0 == ["r"] && alpha < d && d < theta && theta < a {
         let message = "alpha, d, theta, r may be Khalil and Kleinfinger's, where d is the length and r the offset";
-        let hint = "`--columns NAME,NAME,...` names the columns in their order: alpha, a, theta and d where they are these, `-` for others";
-        return Err(grid.refuse(grid.rows.first().map_or(1, |(line, _)| *line), message.to_owned(), Some(hint)));
+        return Err(grid.refuse(grid.rows.first().map_or(1, |(line, _)| *line), message.to_owned(), Some(BY_FLAG)));
     }
     Ok([alpha, a, theta, d])
+}
+
+/// The column of the joints' zero offsets as toolboxes have it: `offset` alone is d where no other column is.
+pub(super) fn zero_offsets(names: &[String]) -> Option<usize> {
+    // `Link offset` is d.
+    let first = |name: &str| names::words(name).0.first().is_some_and(|word| word == "offset");
+    let is_offset = |at: &usize| first(&names[*at]) && plain(&names[*at]).0 == ["offset"];
+    let is_d = |name: &String| name.eq_ignore_ascii_case(OWN[3]) || plain(name).0.iter().any(|word| word == "d");
+    let mut found = (0..names.len()).filter(is_offset);
+    found.next().filter(|_| found.next().is_none() && names.iter().any(is_d))
 }
 
 /// The column of a parameter.
@@ -56,12 +68,16 @@ fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
         let is_it = |w: &String| WORDS[which].contains(&w.as_str());
         if letters.is_empty() { matches!(&words[..], [only] if is_it(only)) } else { letters.into_iter().all(is_it) }
     };
-    let found: Vec<usize> = (0..names.len()).filter(|&i| says(&names[i])).collect();
+    let is_other = |at: usize| which == 3 && zero_offsets(names) == Some(at);
+    let found: Vec<usize> = (0..names.len()).filter(|&i| says(&names[i]) && !is_other(i)).collect();
     let line = grid.rows.first().map_or(1, |(line, _)| *line);
     match found[..] {
         [at] => Ok(at),
-        [] => Err(grid.refuse(line, format!("no column `{own}`; the header has: {}", names.join(", ")), Some(HINT))),
-        _ => Err(grid.refuse(line, format!("two columns `{wanted}`"), Some(HINT))),
+        [] => zero_offsets(names).filter(|_| which == 2).ok_or_else(|| {
+            let message = format!("no column `{own}`; the header has: {}", names.join(", "));
+            grid.refuse(line, message, Some(&format!("{HINT}; {BY_FLAG}")))
+        }),
+        _ => Err(grid.refuse(line, format!("two columns `{wanted}`"), Some(&format!("{HINT}; {BY_FLAG}")))),
     }
 }
 

@@ -21,6 +21,9 @@ const TWIST: &str = "a twist";
 /// How far an angle may be from a multiple of 90 deg that was rounded, deg.
 const DRAWN_DEG: f64 = 0.1;
 
+/// The same in this program's own tables, which may hold zeros that were identified, deg: more than a joint's zero is set off by.
+const BUILT_DEG: f64 = 5.0;
+
 /// A way to read a table.
 #[derive(Debug, Clone, Default)]
 pub struct Reading {
@@ -106,11 +109,14 @@ impl Reading {
             _ if self.calls => {
                 (Some(Convention::Classic), "links of a toolbox are where nothing else is said".to_owned())
             }
+            // A classic table may have these names, too, where its ends are those of one.
+            _ if self.own && shown != Some(Convention::Classic) => {
+                (Some(Convention::Modified), "the names are of this program's tables".to_owned())
+            }
             (None, None, Some(shown)) => {
                 let other = if shown == Convention::Classic { Convention::Modified } else { Convention::Classic };
                 (Some(shown), format!("{ends}; `--dh {}` reads it the other way", other.name()))
             }
-            _ if self.own => (Some(Convention::Modified), "the names are of this program's tables".to_owned()),
             _ => (None, ends),
         }
     }
@@ -155,14 +161,18 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     beta_deg.truncate(joints);
     limits_deg.truncate(joints);
     slides.truncate(joints);
-    let sliding: Vec<String> = (1..).zip(&slides).filter(|(_, slides)| **slides).map(|(j, _)| j.to_string()).collect();
+    let flipped: Vec<bool> = table.flipped(columns)?.into_iter().take(joints).collect();
+    let numbers = |of: &[bool]| -> String {
+        let which: Vec<String> = (1..).zip(of).filter(|(_, of)| **of).map(|(j, _)| j.to_string()).collect();
+        which.join(", ")
+    };
     for (low, high) in limits_deg.iter_mut().zip(&slides).filter(|(_, slides)| **slides).filter_map(|(l, _)| l.as_mut())
     {
         (*low, *high) = (d.converted(*low), d.converted(*high));
     }
     let stated = names.and_then(|names| of_link_before(names, columns));
     let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
-    let offsets = odd_offsets(table, columns[2], &rows, &slides).filter(|_| !own);
+    let offsets = odd_offsets(table, columns[2], &rows, &slides, if own { BUILT_DEG } else { DRAWN_DEG });
     let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
     order.sort_unstable();
     let columns = order.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",");
@@ -172,8 +182,11 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     };
     let (angle, length) = (word(alpha, theta), word(a, d));
     let mut said = format!("{joints} joints; columns {columns}, angles in {angle}, lengths in {length}");
-    if !sliding.is_empty() {
-        let _ = write!(said, ", sliding: {}", sliding.join(", "));
+    if slides.contains(&true) {
+        let _ = write!(said, ", sliding: {}", numbers(&slides));
+    }
+    if flipped.contains(&true) {
+        let _ = write!(said, ", counted the other way: {}", numbers(&flipped));
     }
     if names.is_none() {
         said.push_str(", no header");
@@ -185,17 +198,17 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
         let _ = write!(said, ", left out: {}", left_out.join(", "));
     }
     let (words, open) = (table.words, angles_open.or(lengths_open));
-    let found = Reading { rows, flange, beta_deg, limits_deg, slides, said, columns, ..Reading::default() };
+    let found = Reading { rows, flange, beta_deg, limits_deg, slides, flipped, said, columns, ..Reading::default() };
     Ok(Reading { stated, words, own, open, offsets, length_mm: d.converted(1.0), ..found })
 }
 
 /// The numbers in the place of theta that a drawing seldom has, where nothing says that they are offsets.
-fn odd_offsets(table: &Table, theta: usize, rows: &[Row], slides: &[bool]) -> Option<String> {
+fn odd_offsets(table: &Table, theta: usize, rows: &[Row], slides: &[bool], from_deg: f64) -> Option<String> {
     let is_offset = table.names.is_some_and(|names| names[theta].to_lowercase().contains("offset"));
     let is_odd = |(at, row): &(usize, &Row)| {
         let from_drawn_deg = row[2] - 90.0 * (row[2] / 90.0).round();
         let added = table.value(&table.rows[*at].1[theta]).is_some_and(|v| v.variable);
-        from_drawn_deg.abs() > DRAWN_DEG && !(added || slides[*at])
+        from_drawn_deg.abs() > from_deg && !(added || slides[*at])
     };
     let odd = rows.iter().enumerate().filter(is_odd);
     let odd: Vec<String> = odd.map(|(at, row)| format!("{} ({:.2} deg)", at + 1, row[2])).collect();

@@ -25,7 +25,18 @@ pub(super) struct Table<'a> {
 impl Table<'_> {
     /// What a cell says: a number, or a formula.
     pub fn value(&self, cell: &str) -> Option<Value> {
-        expression::evaluate(cell, &|name| self.known.get(name).copied())
+        let known = |name: &str| self.known.get(name).copied();
+        expression::evaluate(cell, &known).or_else(|| expression::counted_back(cell, &known))
+    }
+
+    /// Which rows are of joints that count the other way by the variable in their cell.
+    pub fn flipped(&self, columns: [usize; 4]) -> Result<Vec<bool>> {
+        let slides = self.sliding()?;
+        let of_row = |((_, row), slides): (&(u64, Fields), bool)| {
+            let cell = &row[columns[if slides { 3 } else { 2 }]];
+            expression::counted_back(cell, &|name| self.known.get(name).copied()).is_some()
+        };
+        Ok(self.rows.iter().zip(slides).map(of_row).collect())
     }
 
     /// Whether a column counts the rows, from 0 or from 1.

@@ -4,6 +4,8 @@ use crate::files::Result;
 use crate::robot::catalogue::Convention;
 use crate::tables::names::Unit;
 
+mod joints;
+
 fn of(name: &str, text: &str, asked: Asked) -> Result<Vec<Reading>> {
     let (_folder, path) = crate::files::temporary(name, text);
     readings(&path, &asked)
