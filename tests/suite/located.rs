@@ -164,8 +164,13 @@ fn an_instrument_that_stands_elsewhere_is_taken_from_its_new_placement_on() {
     let (status, said) = check(&["--placement", "there/placement.json"]);
     assert!(status == 0 && !said.contains("go on with this robot"), "{said}");
     assert!(said.contains("what its own `check` says of it stands"), "{said}");
-    // The placement of other groups is none of these rows.
+    // One in another frame is not compared with, and one of other groups is none of these rows.
     let other = std::fs::read_to_string(at.join("there/placement.json")).unwrap();
+    let mut mirrored: Value = serde_json::from_str(&other).unwrap();
+    mirrored["mirrored"] = true.into();
+    std::fs::write(at.join("mirrored.json"), mirrored.to_string()).unwrap();
+    let (status, said) = check(&["--placement", "mirrored.json"]);
+    assert!(status == 0 && said.contains("where the sensor stands is not compared"), "{said}");
     std::fs::write(at.join("other.json"), other.replacen("\"group\": \"1\"", "\"group\": \"far\"", 1)).unwrap();
     let (status, said) = check(&["--placement", "other.json"]);
     assert!(status == 2 && said.contains("other.json is of group far, and the rows are of 1"), "{said}");

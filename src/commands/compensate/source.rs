@@ -35,19 +35,19 @@ impl Source {
     }
 
     /// With the data file of this program behind it, where it stands beside it.
-    pub(super) fn with_data(self, program: &Utf8Path) -> files::Result<Source> {
-        let beside = ["dat", "DAT"].map(|ending| program.with_extension(ending));
+    pub(super) fn with_data(self, path: &Utf8Path) -> files::Result<Source> {
+        let beside = ["dat", "DAT"].map(|ending| path.with_extension(ending));
         let Some(path) = beside.into_iter().find(|path| path.is_file()) else { return Ok(self) };
         let Source { text: data, encoding, .. } = Source::read(&path)?;
-        let (mut text, program) = (self.text, self.encoding);
-        let end = text.len();
+        let mut text = self.text;
+        let program = text.len();
         if !text.ends_with('\n') {
             text.push('\n');
         }
         let lines = text.matches('\n').count() as u64;
-        let data_file = Data { path, encoding, program: end, from: text.len(), lines };
+        let beside = Data { path, encoding, program, from: text.len(), lines };
         text.push_str(&data);
-        Ok(Source { text, encoding: program, data: Some(data_file) })
+        Ok(Source { text, encoding: self.encoding, data: Some(beside) })
     }
 
     pub(super) fn data_file(&self) -> Option<&Utf8Path> {

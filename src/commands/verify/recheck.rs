@@ -95,13 +95,24 @@ fn opened(args: &Verify, against: &Utf8Path, config: &Config, run: Run, paths: &
 
 /// Where the sensor stood: as the file says that is named, which must have a group of these rows, or one beside the robot, where it is there.
 fn stood(named: Option<&Utf8Path>, against: &Utf8Path, set: &Dataset) -> Result<Option<PlacementFile>> {
-    let Some(path) = named else { return Ok(PlacementFile::read(&against.with_file_name(PLACEMENT)).ok()) };
-    let file = PlacementFile::read(path)?;
+    let path = named.map_or_else(|| against.with_file_name(PLACEMENT), Utf8Path::to_owned);
+    let file = match PlacementFile::read(&path) {
+        Ok(file) => file,
+        Err(_) if named.is_none() => return Ok(None),
+        Err(e) => return Err(e.into()),
+    };
+    if file.mirrored != set.mirrored {
+        let (placed, rows) = if file.mirrored { ("", " not") } else { (" not", "") };
+        progress::warn(format!(
+            "{path} is{placed} of points whose x was negated, and these are{rows}: where the sensor stands is not compared"
+        ));
+        return Ok(None);
+    }
     let [placed, rows]: [Vec<&str>; 2] = [
         file.groups.iter().map(|group| group.group.as_str()).collect(),
         set.groups.iter().map(|group| group.name.as_str()).collect(),
     ];
-    if rows.iter().any(|name| placed.contains(name)) {
+    if named.is_none() || rows.iter().any(|name| placed.contains(name)) {
         return Ok(Some(file));
     }
     let problem =
