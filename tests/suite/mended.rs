@@ -130,7 +130,7 @@ fn each_robot_is_judged_by_the_rows_as_it_counts_its_joints() {
     assert!(mean(1) < 2.0 * right_mm && mean(2) < 2.0 * right_mm && mean(3) > 20.0 * right_mm, "{json}");
     let said = stderr(&told);
     assert!(told.status.code() == Some(1) && said.contains("counted.toml counts its joints as the rows do"), "{said}");
-    assert_eq!(said.matches("counts its joints as").count(), 1, "{said}");
+    assert!(!said.contains("out/identified.toml counts its joints"), "{said}");
 }
 
 #[test]

@@ -75,11 +75,12 @@ impl Program {
             return Err(refuse(message, CSV_HINT));
         }
         if read.motions.is_empty() && !args.joint_targets_only {
+            let is_data = language == Language::Krl && !language.has_data_file(path);
             let message = match moved_by.len() {
                 1 => "1 joint target, but no instruction that moves to it, in this file".to_owned(),
                 count => format!("{count} joint targets, but no instruction that moves to them, in this file"),
             };
-            return Err(refuse(message, if language == Language::Krl { OF_DATA_HINT } else { ALONE_HINT }));
+            return Err(refuse(message, if is_data { OF_DATA_HINT } else { ALONE_HINT }));
         }
         if moved_by.len() > MOST_ROWS {
             return Err(refuse(format!("more than {MOST_ROWS} targets"), "split the program"));

@@ -121,9 +121,10 @@ mod tests {
         let turned = mended(&written, &other, &world.truth).unwrap();
         let is_written = |robot: &Robot| taken(&written, &turned, robot, &Settings::default()) == &written;
         assert!(is_written(&world.truth) && !is_written(&other));
-        let mut off = world.truth.clone();
-        off.joints[1].sign = -1.0;
-        assert!(!is_written(&off));
+        let mut point = world.truth.clone();
+        point.tool_mm = nalgebra::Vector3::zeros();
+        point.joints.iter_mut().for_each(|joint| (joint.a_mm, joint.d_mm) = (0.0, 0.0));
+        assert!(!is_written(&point));
     }
 
     #[test]
