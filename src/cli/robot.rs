@@ -68,6 +68,9 @@ pub struct Verify {
     /// With --against: how far the target may move, mm [default: key `tolerance_mm`, or what 95 % of the errors were stated to be below, where that is more]
     #[arg(long, value_name = "MM", requires = "against", allow_negative_numbers = true, value_parser = between(1e-4, 1e3))]
     pub tolerance_mm: Option<f64>,
+    /// With --against: where the sensor stands by now, as `locate` found it [default: placement.json beside the robot]
+    #[arg(long, value_name = "FILE", requires = "against")]
+    pub placement: Option<Utf8PathBuf>,
     /// With --against: folder for results; key `out` [default: out]
     #[arg(long, value_name = "DIR", requires = "against")]
     pub out: Option<Utf8PathBuf>,

@@ -48,7 +48,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     shared::suppose_scale(&mut set);
     let as_read = set;
     let bar = progress::bar("identifying", 2 + step_count(&settings));
-    let Examined { set, robot: nominal, along, findings, against, unexplained } =
+    let Examined { set, robot: nominal, along, findings, against, unexplained, .. } =
         examine::examine(&as_read, &given, &settings, &|step| bar.begin(step));
     if unexplained.is_some() {
         // What was mended on the way may have been mended because the cameras are on the hand.

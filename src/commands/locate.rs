@@ -17,9 +17,11 @@ use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::still;
 use crate::identify::examine::{self, Examined};
+use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
-use crate::identify::judge::folds;
 use crate::identify::judge::locate::{Fit, locate};
+use crate::identify::judge::{folds, strays};
+use crate::identify::record;
 use crate::robot::{Advice, Check};
 use crate::{progress, report, robot};
 
@@ -48,11 +50,15 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
 
     let set = Dataset::new(&rows)?;
     still::check_points(&set)?;
-    let Examined { set, robot: mended, findings, against, unexplained, .. } =
+    let Examined { set, robot: of_rows, along, findings, mended, against, unexplained } =
         examine::examine(&set, &robot, &config.identify, &|_| {});
     // The robot is that of its file: what is wrong between the two is mended in the rows.
-    let set = examine::on_rows::mended(&set, &robot, &mended).unwrap_or(set);
-    against.iter().chain(&findings).chain(&unexplained).for_each(|finding| progress::warn(finding.sentence()));
+    let set = examine::on_rows::mended(&set, &robot, &of_rows).unwrap_or(set);
+    let moved = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along));
+    let said = against.iter().chain(&findings).chain(&unexplained).cloned().chain(moved);
+    said.for_each(|finding| progress::warn(finding.sentence()));
+    let mut doubts: Vec<String> =
+        against.iter().chain(&unexplained).chain(&along.robots).chain(&mended).map(Finding::sentence).collect();
     if unexplained.is_some() {
         examine::in_hand::refuse(&set, &robot)?;
     }
@@ -65,25 +71,31 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
         })?;
     let is_placed = |row: &usize| located.fit.stray.as_ref().is_none_or(|stray| stray.row != *row);
     let all: Vec<usize> = set.rows(|_| true).into_iter().filter(is_placed).collect();
-    let held_out = folds::judged(&Judge::plain(&set, &all, false), &located.placed.robot, &all);
+    let (judge, placed) = (Judge::plain(&set, &all, false), &located.placed.robot);
+    let held_out = folds::judged(&judge, placed, &all);
+    let strays = strays::find(&judge, (&[placed], &[&set]), &all).map(|strays| strays.statement(&set));
+    strays.iter().for_each(progress::warn);
+    doubts.extend(strays);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
     placement.check = match check {
         Some(Check { advice: Advice::DoNotUse, .. }) if !located.fit.contradicted => check,
-        check => of_points(&located.fit).or(check),
+        check => of_rows_and_fit(&doubts, &located.fit).or(check),
     };
     let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;
-    let summary = || report::located::summary(&content.placement, &content.fit, &out);
+    let is_doubted = !doubts.is_empty();
+    let summary = || report::located::summary(&content.placement, &content.fit, is_doubted, &out);
     let stdout = if args.measure.output.json { json } else { summary() };
-    let is_whole = !content.fit.contradicted && content.fit.stray.is_none();
+    let is_whole = content.fit.objection().is_none() && !is_doubted;
     let status = if is_whole { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status: status.or_worse(heeded) })
 }
 
-/// What the points say of the robot's use; `None` where they agree with it.
-fn of_points(fit: &Fit) -> Option<Check> {
+/// What the rows say of the placement's use; `None` where they are as they are written and agree with the robot.
+fn of_rows_and_fit(doubts: &[String], fit: &Fit) -> Option<Check> {
     let advice = if fit.contradicted { Advice::DoNotUse } else { Advice::Check };
-    Some(Check { advice, reason: fit.objection()?, mended: Vec::new() })
+    let reasons: Vec<String> = fit.objection().into_iter().chain(doubts.iter().cloned()).collect();
+    (!reasons.is_empty()).then(|| Check { advice, reason: reasons.join("; "), mended: Vec::new() })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.

@@ -18,23 +18,29 @@ fn line(what: &str, record: &TransformRecord) -> String {
     format!("{what}: {shift}{turn}")
 }
 
-/// Whether the robot agrees with the points, the placement, the error to expect.
-pub fn summary(placement: &PlacementFile, fit: &Fit, out: &OutDir) -> String {
+/// Whether the robot agrees with the points, the placement, the error to expect; `is_doubted` where warnings speak against the rows.
+pub fn summary(placement: &PlacementFile, fit: &Fit, is_doubted: bool, out: &OutDir) -> String {
     let poses = fit.poses;
     let mut lines = Vec::new();
-    lines.extend(fit.objection().map(|why| {
+    let of_rows = is_doubted.then(|| "the warnings say what is wrong with its rows".to_owned());
+    lines.extend(fit.objection().or(of_rows).map(|why| {
         let use_ = if fit.contradicted { "do not use this placement" } else { "check before you use this placement" };
         format!("{use_}: {why}")
     }));
     for group in &placement.groups {
         let sensor = if placement.by_instrument { "instrument" } else { "rig" };
-        lines.push(line(&format!("base from {sensor}, {}", group.group), &group.base_from_rig));
+        lines.push(line(&format!("base from {sensor}, {}", group.name()), &group.base_from_rig));
         lines.push(format!(
             "  error to expect of the target: {:.4} mm on average, 95 % below {:.4}; {} on poses held out",
             group.error_mm.mean_mm,
             group.error_mm.p95_mm,
             number(group.held_out.mean_abs_mm, 4)
         ));
+    }
+    if placement.mirrored {
+        lines.push(
+            "  of points whose x is negated: those of the file are left-handed, and no placement is theirs".to_owned(),
+        );
     }
     lines.extend(placement.flange_from_target.as_ref().map(|target| line("flange from target", target)));
     lines.push(match fit.misfit.freedom {

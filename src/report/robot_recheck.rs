@@ -10,14 +10,15 @@ use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::formats::robot_recheck::HISTORY;
 use crate::identify::judge::recheck::{CauseSeen, Recheck};
+use crate::robot::Advice;
 
 /// What was judged of the robot, and by which tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
     pub standing: Standing,
     pub tolerance_mm: f64,
-    /// Whether the robot's own file advises against its use.
-    pub advised_against: bool,
+    /// What the robot's own file says of its use.
+    pub advice: Advice,
     /// Whether the rows were mended for the check: they are not what their file says.
     pub is_mended: bool,
 }
@@ -54,11 +55,14 @@ const ANOTHER_ARM_MM: f64 = 50.0;
 
 fn next(judged: Judged, recheck: &Recheck) -> &'static str {
     match judged.standing {
-        Standing::StillValid if judged.advised_against => {
+        Standing::StillValid if judged.advice == Advice::DoNotUse => {
             "identify anew: it is the same robot, and what was found of it is advised against"
         }
         Standing::StillValid if judged.is_mended => {
             "mend the file as the warning says, and check again (until then the status is 1): the robot still is that robot for rows that were mended"
+        }
+        Standing::StillValid if judged.advice == Advice::Check => {
+            "it is the robot that was identified, and what its own `check` says of it stands: look at that, then go on with it"
         }
         Standing::StillValid => "go on with this robot",
         Standing::Undecided if !recheck.strays.is_empty() => {
@@ -78,10 +82,14 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
             "add poses spread over the workspace, which bend every joint and turn the wrist, and check with them: they tell the robot from what measures it; until then use neither"
         }
         _ if !recheck.changed && !recheck.is_same() => {
-            "`stereocal locate` finds the placement anew; add poses spread over the workspace, which bend every joint and turn the wrist: they tell whether the robot stays"
+            "`stereocal locate TABLE --robot IDENTIFIED --out DIR` finds the placement anew, `--placement DIR/placement.json` then checks with it; add poses spread over the workspace, which bend every joint and turn the wrist: they tell whether the robot stays"
         }
-        _ if !recheck.changed && recheck.by_cameras => "`stereocal locate` finds the cameras anew; the robot stays",
-        _ if !recheck.changed => "`stereocal locate` finds the instrument's placement anew; the robot stays",
+        _ if !recheck.changed && recheck.by_cameras => {
+            "`stereocal locate TABLE --robot IDENTIFIED --out DIR` finds the cameras anew, `--placement DIR/placement.json` then checks with it; the robot stays"
+        }
+        _ if !recheck.changed => {
+            "`stereocal locate TABLE --robot IDENTIFIED --out DIR` finds the instrument's placement anew, `--placement DIR/placement.json` then checks with it; the robot stays"
+        }
         Standing::ChangedWithin => {
             "targets are within the tolerance still; look at what is named, and identify anew before it grows"
         }

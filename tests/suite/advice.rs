@@ -152,6 +152,36 @@ fn a_robot_of_another_arms_file_carries_that_it_is_not_to_be_used() {
     assert_eq!(exported.status.code(), Some(0), "{}", stderr(&exported));
 }
 
+/// What is wrong with a robot that was identified from a file its `check` says, and not that it is of another file.
+#[test]
+fn a_robot_far_from_the_file_that_it_was_identified_from_is_compensated_with_its_reason() {
+    let folder = identified("robot.toml");
+    let at = folder.path();
+    let path = camino::Utf8Path::from_path(at).unwrap();
+    let mut robot = stereocal::robot::file::read(&path.join("robot.toml")).unwrap();
+    let mut write = |name: &str, by_mm: f64| {
+        robot.joints[2].a_mm += by_mm;
+        std::fs::write(at.join(name), stereocal::robot::file::to_toml(&robot)).unwrap();
+    };
+    write("far.toml", 20.0);
+    write("other.toml", 0.5);
+    let rows = ["--measurements", "truth/measurements.csv", "--method", "trust-region", "--extensions", "none"];
+    let found = stereocal(at, &[&["identify", "--robot", "far.toml", "--out", "far"], &rows[..]].concat());
+    assert_eq!(found.status.code(), Some(1), "{}{}", stdout(&found), stderr(&found));
+    std::fs::write(at.join("t.csv"), "name,j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg\na,79,31,-87,-124,19,0\n")
+        .unwrap();
+    let compensate = |robot: &str| {
+        let pair = ["--robot", robot, "--identified", "far/identified.toml", "--out", "c", "--force"];
+        let told = stereocal(at, &[&["compensate", "t.csv"], &pair[..]].concat());
+        (told.status.code(), stdout(&told) + &stderr(&told))
+    };
+    let (status, said) = compensate("far.toml");
+    assert!(status == Some(1) && said.contains("do not use far/identified.toml, says its own `check`: "), "{said}");
+    assert!(said.contains("1 of 1 target compensated"), "{said}");
+    let (status, said) = compensate("other.toml");
+    assert!(status == Some(2) && said.contains("is not the arm of `other.toml`"), "{said}");
+}
+
 #[test]
 fn verify_says_that_a_robot_was_fitted_to_the_rows_and_what_its_columns_are() {
     let folder = identified("robot.toml");

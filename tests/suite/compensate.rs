@@ -482,13 +482,73 @@ fn what_compensate_wrote_is_not_corrected_again() {
     let said = run(folder.path(), &["once/compensated.csv", "--out", "twice"], 2);
     assert!(said.contains("is what `compensate` wrote"), "{said}");
     assert!(!folder.path().join("twice").exists(), "nothing is written");
-    // The same numbers elsewhere are anybody's.
+    // A copy is known again, whatever it is called, by the folder of results near to it, to this one or named.
     std::fs::create_dir(folder.path().join("mine")).unwrap();
-    std::fs::copy(folder.path().join("once/compensated.csv"), folder.path().join("mine/targets.csv")).unwrap();
+    let copy = folder.path().join("mine/targets.csv");
+    std::fs::copy(folder.path().join("once/compensated.csv"), &copy).unwrap();
+    for out in ["thrice", "once"] {
+        let said = run(folder.path(), &["mine/targets.csv", "--out", out, "--force"], 2);
+        assert!(said.contains("is what `compensate` wrote"), "{said}");
+    }
+    // Other numbers are anybody's, and so is what a run left as it was.
+    let more = std::fs::read_to_string(&copy).unwrap() + "own,10,20,-15,5,40,30,ok\n";
+    std::fs::write(&copy, more).unwrap();
     run(folder.path(), &["mine/targets.csv", "--out", "thrice"], 0);
-    // A copy of what stands in the folder of results is known again.
-    let said = run(folder.path(), &["mine/targets.csv", "--out", "once", "--force"], 2);
-    assert!(said.contains("is what `compensate` wrote"), "{said}");
+    let program = "def go():\n  movej([0.1, -0.2, 0.3, 0.4, 0.5, 0.6])\nend\n";
+    std::fs::write(folder.path().join("go.script"), program).unwrap();
+    let same = ["compensate", "go.script", "--robot", "robot.toml", "--identified", "robot.toml"];
+    for out in ["same", "again"] {
+        let told = stereocal(folder.path(), &[&same[..], &["--out", out]].concat());
+        assert_eq!(told.status.code(), Some(1), "{}{}", stdout(&told), stderr(&told));
+    }
+}
+
+/// Points of inline forms stand in the data file of the program.
+#[test]
+fn a_program_is_corrected_with_the_points_of_its_data_file() {
+    let folder = workplace();
+    let at = folder.path();
+    let (nominal, real) = robots(at);
+    let program =
+        |point: &str| format!("DEF a( )\nPTP {{A1 10,A2 20,A3 -15,A4 5,A5 40,A6 30}}\nPTP {point} C_PTP\nEND");
+    let aggregate = "{A1 -20,A2 12.5,A3 -31,A4 15,A5 55,A6 -40,E1 0.0}";
+    let data = format!(
+        "DEFDAT a\nDECL E6AXIS XP4={aggregate}\nDECL E6AXIS XP5={aggregate}\nDECL E6POS XP6={{X 1,Y 2,Z 3,A 0,B 0,C 0}}\nENDDAT\n"
+    );
+    std::fs::write(at.join("a.src"), program("XP4")).unwrap();
+    std::fs::write(at.join("a.dat"), &data).unwrap();
+    let said = run(at, &["a.src", "--out", "o"], 0);
+    assert!(said.contains("compensated/a.src, o/compensated/a.dat") && said.contains("all 2 motions"), "{said}");
+    let [src, dat] =
+        ["a.src", "a.dat"].map(|name| std::fs::read_to_string(at.join("o/compensated").join(name)).unwrap());
+    assert!(src.starts_with("DEF a( )\nPTP {A1 ") && src.ends_with("\nPTP XP4 C_PTP\nEND"), "{src}");
+    let lines: Vec<&str> = dat.lines().collect();
+    let others: Vec<&str> = data.lines().collect();
+    assert!(
+        lines.len() == 5 && lines[0] == others[0] && lines[2..] == others[2..] && lines[1].ends_with(",E1 0.0}"),
+        "{dat}"
+    );
+    let reading = |axis: usize| {
+        let (_, behind) = lines[1].split_once(&format!("A{axis} ")).unwrap();
+        behind.split(',').next().unwrap().parse::<f64>().unwrap()
+    };
+    let found: Vec<f64> = (1..=6).map(reading).collect();
+    let meant = nominal.base_from_flange(&radians(&[-20.0, 12.5, -31.0, 15.0, 55.0, -40.0]));
+    let off = meant.inverse() * real.base_from_flange(&radians(&found));
+    assert!(off.translation.vector.norm() < SAME_MM && off.rotation.angle() < SAME_RAD, "{dat}");
+    // A data file that is corrected already is not corrected again.
+    std::fs::copy(at.join("o/compensated/a.dat"), at.join("a.dat")).unwrap();
+    let said = run(at, &["a.src", "--out", "p"], 2);
+    assert!(said.contains("a.dat is what `compensate` wrote"), "{said}");
+    // A pose, and a point that is in neither.
+    std::fs::write(at.join("a.dat"), &data).unwrap();
+    for (point, why) in [("XP6", "PTP XP6 is Cartesian"), ("XP7", "PTP XP7 moves by values")] {
+        std::fs::write(at.join("a.src"), program(point)).unwrap();
+        let said = run(at, &["a.src", "--out", "q"], 2);
+        assert!(said.contains(why), "{said}");
+        let said = run(at, &["a.src", "--out", point, "--joint-targets-only"], 1);
+        assert!(said.contains(why) && !at.join(point).join("compensated/a.dat").exists(), "{said}");
+    }
 }
 
 #[test]

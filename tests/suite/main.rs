@@ -32,6 +32,7 @@ mod guide_pictures;
 mod house;
 mod identify;
 mod known_move;
+mod located;
 mod measure;
 mod mended;
 mod messages;

@@ -110,6 +110,30 @@ fn verify_says_what_its_figures_are_of() {
 }
 
 #[test]
+fn each_robot_is_judged_by_the_rows_as_it_counts_its_joints() {
+    let folder = identified();
+    let at = folder.path();
+    rows_of(at, ",1,", |_| ());
+    let right_mm = mean(&verify(at).1, "verify");
+    rows_of(at, ",1,", |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
+    // As `identify` finds it from such rows, and one that is off however the rows are read.
+    let mut counted = file::read(&Utf8Path::from_path(at).unwrap().join("out/identified.toml")).unwrap();
+    counted.joints[2].sign = -1.0;
+    std::fs::write(at.join("counted.toml"), file::to_toml(&counted)).unwrap();
+    counted.joints[1].sign = -1.0;
+    std::fs::write(at.join("off.toml"), file::to_toml(&counted)).unwrap();
+    let files = ["robot.toml", "counted.toml", "out/identified.toml", "off.toml"];
+    let robots: Vec<&str> = files.iter().flat_map(|file| ["--robot", file]).collect();
+    let told = stereocal(at, &[&["verify", "--measurements", "new.csv", "--json"], &robots[..]].concat());
+    let json: serde_json::Value = serde_json::from_slice(told.stdout.as_slice()).unwrap();
+    let mean = |k: usize| json["robots"][k]["verify"]["point"]["mean_abs_mm"].as_f64().unwrap();
+    assert!(mean(1) < 2.0 * right_mm && mean(2) < 2.0 * right_mm && mean(3) > 20.0 * right_mm, "{json}");
+    let said = stderr(&told);
+    assert!(told.status.code() == Some(1) && said.contains("counted.toml counts its joints as the rows do"), "{said}");
+    assert!(!said.contains("out/identified.toml counts its joints"), "{said}");
+}
+
+#[test]
 fn rows_outside_the_ranges_that_terms_were_identified_in_are_said() {
     let folder = identified();
     let at = folder.path();
@@ -163,7 +187,7 @@ fn a_check_of_rows_in_metres_or_with_a_sign_flipped_names_that() {
     rows(at, |rows| scaled(rows, POINT..POINT + 3, 0.001));
     let (status, said) = against();
     assert!(status == 1 && said.contains("the readings are in m, not in mm"), "{said}");
-    assert!(said.contains("whether the robot was identified from these rows is not known"), "{said}");
+    assert!(said.contains("whether these rows are new, or rows of the identification in another form"), "{said}");
     assert!(!said.contains("CHANGED"), "{said}");
     rows(at, |rows| scaled(rows, JOINT + 2..JOINT + 3, -1.0));
     let (status, said) = against();

@@ -1,6 +1,8 @@
 //! Targets that are hardly what was meant: corrected already, in another unit, or in a language that is not read.
 
-use camino::Utf8Path;
+use std::collections::BTreeSet;
+
+use camino::{Utf8Path, Utf8PathBuf};
 
 use super::super::Result;
 use crate::compensate::Target;
@@ -10,17 +12,23 @@ use crate::programs::{Language, unread};
 use crate::robot::{Robot, file};
 use crate::{config, files, progress};
 
-/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them, or in one
-/// of these folders, where they are a copy.
+/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them, in one
+/// of these folders, or in a folder beside any of these or of the working directory, where they are a copy.
 pub(super) fn refuse_corrected(targets: &Utf8Path, folders: &[&Utf8Path]) -> Result<()> {
-    let folder = targets.parent().unwrap_or(Utf8Path::new(""));
-    let above = folder.parent().unwrap_or(Utf8Path::new(".."));
-    let written_by = |folder: &Utf8Path| Provenance::of_json(&folder.join("compensate.json"));
+    let here = |folder: &Utf8Path| if folder.as_str().is_empty() { Utf8PathBuf::from(".") } else { folder.to_owned() };
+    let folder = here(targets.parent().unwrap_or(Utf8Path::new("")));
+    let above =
+        if folder == "." { Utf8PathBuf::from("..") } else { here(folder.parent().unwrap_or(Utf8Path::new(""))) };
+    let near = [folder, above, Utf8PathBuf::from(".")].into_iter().chain(folders.iter().map(|folder| here(folder)));
+    let near: BTreeSet<Utf8PathBuf> = near.collect();
+    let below = |folder: &Utf8PathBuf| folder.read_dir_utf8().into_iter().flatten().flatten().map(|e| e.into_path());
+    let all = near.iter().cloned().chain(near.iter().flat_map(below));
     let hash = Digested::read(targets).map(|digested| digested.sha256);
-    let wrote = |run: &Provenance| run.outputs.iter().any(|output| Some(&output.sha256) == hash.as_ref());
-    let Some(run) = [folder, above].iter().chain(folders).copied().filter_map(written_by).find(wrote) else {
-        return Ok(());
-    };
+    let holds = |list: &[Digested]| list.iter().any(|known| Some(&known.sha256) == hash.as_ref());
+    // Of a run that changed nothing both are one.
+    let wrote = |run: &Provenance| holds(&run.outputs) && !holds(&run.inputs);
+    let mut runs = all.filter_map(|folder| Provenance::of_json(&folder.join("compensate.json")));
+    let Some(run) = runs.find(wrote) else { return Ok(()) };
     Err(config::Error::Usage {
         message: format!("{targets} is what `compensate` wrote ({}): its targets are corrected already", run.date),
         hint: format!("give the targets as they were written for the nominal robot; that run was `{}`", run.command),
@@ -55,15 +63,21 @@ pub(super) fn refuse_unread(targets: &Utf8Path) -> Result<()> {
     }
 }
 
+/// Whether the record beside an identified robot says that it is of that file, and was identified from this one.
+pub(super) fn is_made_of(identified: &Utf8Path, robot: &Utf8Path) -> bool {
+    let record = Provenance::of_json(&identified.with_file_name("identification.json"));
+    let holds = |list: &[Digested], file: &Utf8Path| {
+        Digested::read(file).is_some_and(|here| list.iter().any(|known| known.sha256 == here.sha256))
+    };
+    record.is_some_and(|run| holds(&run.inputs, robot) && holds(&run.outputs, identified))
+}
+
 /// That both robots are ones that `identify` found, and the second was not found from the first.
 pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<String> {
     if !file::is_identified(robot) || !file::is_identified(identified) {
         return None;
     }
-    let made_by = Provenance::of_json(&identified.with_file_name("identification.json"));
-    let here = Digested::read(robot)?;
-    let is_made_of = made_by.is_some_and(|run| run.inputs.iter().any(|input| input.sha256 == here.sha256));
-    (!is_made_of).then(|| {
+    (!is_made_of(identified, robot)).then(|| {
         format!(
             "--robot {robot} is itself a robot that `identify` found, and {identified} was not identified from it: the targets are taken as written \
              for it; where they were written for the nominal robot, `--robot` names the file that `identify` was given"

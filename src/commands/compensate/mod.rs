@@ -3,6 +3,7 @@
 mod doubts;
 mod pair;
 mod program;
+mod source;
 mod told;
 
 use camino::Utf8Path;
@@ -16,7 +17,7 @@ use crate::diagnostic::Status;
 use crate::files::OutDir;
 use crate::files::provenance::Run;
 use crate::formats::targets::{self, Row};
-use crate::programs::{self, JointOrder, Joints, Language};
+use crate::programs::{JointOrder, Joints, Language};
 use crate::progress;
 use pair::Pair;
 use program::Program;
@@ -24,7 +25,8 @@ use told::{Summary, said};
 
 pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let results = args.output.out.as_deref().unwrap_or(&config.out);
-    doubts::refuse_corrected(&args.targets, &[results, args.identified.parent().unwrap_or(Utf8Path::new(""))])?;
+    let folders = [results, args.identified.parent().unwrap_or(Utf8Path::new(""))];
+    doubts::refuse_corrected(&args.targets, &folders)?;
     doubts::refuse_unread(&args.targets)?;
     let pair = Pair::read(args)?;
     doubts::of_nominal(&args.robot, &args.identified).iter().for_each(progress::warn);
@@ -36,14 +38,16 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let joints = Joints { slides: &slides, pulses_per_deg: &args.pulses_per_deg };
     let read = |language| Program::read(args, language, joints, &order);
     let program = Language::of(&args.targets).map(read).transpose()?;
+    let data = program.as_ref().and_then(Program::data_file);
+    data.map_or(Ok(()), |data| doubts::refuse_corrected(data, &folders))?;
     let rows = match &program {
         Some(program) => program.rows(nominal, &order),
         None => targets::read(&args.targets, nominal)?,
     };
     let out = OutDir::open(results)?;
     let run = Run { force: args.output.force, ..run };
-    let out = out.for_run(&run, &[&args.targets, &args.robot, &args.identified]);
-    let program_name = format!("compensated/{}", args.targets.file_name().unwrap_or("program"));
+    let inputs = [args.targets.as_path(), &args.robot, &args.identified].into_iter().chain(data);
+    let out = out.for_run(&run, &inputs.collect::<Vec<&Utf8Path>>());
     out.check_free(&["compensated.csv", "compensate.json"])?;
     tell_of_postures(&rows);
     doubts::warn(&rows, &pair.identified);
@@ -56,12 +60,11 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
         Err(refusal) => (row.name.as_str(), row.given.clone(), refusal.to_string()),
     });
     out.write("compensated.csv", targets::to_csv(nominal, table).as_bytes())?;
-    if let Some(program) = &program {
-        let changed = program.targets().zip(&found);
-        let in_program = |readings: &[f64]| order.in_program(&in_file(readings));
-        let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_program(f.readings.as_ref().ok()?)))).collect();
-        let text = programs::with_readings(program.language, &program.text, joints, &changed);
-        out.write(&program_name, &program.encoding.encoded(&text))?;
+    let mut written = Vec::new();
+    let in_program = |readings: &[f64]| order.in_program(&in_file(readings));
+    for (name, bytes) in program.iter().flat_map(|p| p.corrected(&args.targets, joints, &found, in_program)) {
+        out.write(&name, &bytes)?;
+        written.push(out.join(&name).to_string());
     }
     let motions = program.as_ref().map(|program| program.outcome(&found));
     let there: Vec<&[f64]> = found.iter().filter_map(|f| f.readings.as_deref().ok()).collect();
@@ -70,11 +73,11 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let is_known = beyond.is_none_or(|(_, far)| !far);
     let summary = Summary::new(&rows, &found, motions.as_deref(), &pair);
     let json = out.write_json("compensate.json", &summary)?;
-    let written = out.join(if program.is_some() { &program_name } else { "compensated.csv" });
+    written.extend(written.is_empty().then(|| out.join("compensated.csv").to_string()));
     let whole = summary.is_whole() && is_known && pair.same.is_none() && !pair.tools_differ;
     let status = if whole { heeded } else { Status::OutOfTolerance };
     Ok(Outcome {
-        stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written) },
+        stdout: if args.output.json { json } else { said(&summary, &pair, motions.as_deref(), &written.join(", ")) },
         status,
     })
 }

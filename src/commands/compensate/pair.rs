@@ -4,6 +4,7 @@ use camino::Utf8Path;
 use nalgebra::{Point3, Vector3};
 
 use super::super::Result;
+use super::doubts::is_made_of;
 use crate::cli::Compensate;
 use crate::formats::robots::known;
 use crate::identify::record;
@@ -64,7 +65,9 @@ impl Pair {
         // Terms that were found over a part of the joints' ranges, and links that were split between them, mean nothing beyond it.
         let over = known::identified_over(&args.identified, &identified);
         let is_near = || over.is_some_and(|ranges| nearest_mm(&nominal.within(&ranges), &identified) < NEAR_MM);
-        if let Some(apart) = apart.filter(|_| off.mean_mm > ONE_ARM_MM && !is_near()) {
+        // Of what was identified from the very file its own `check` says what is wrong.
+        let is_other = || off.mean_mm > ONE_ARM_MM && !is_near() && !is_made_of(&args.identified, &args.robot);
+        if let Some(apart) = apart.filter(|_| is_other()) {
             return Err(Error::OtherArm { robot, identified: found, apart }.into());
         }
         let mut pair =

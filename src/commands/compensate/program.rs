@@ -1,27 +1,32 @@
 //! A robot's program: which of its motions move by joint targets that can be corrected.
 
+use camino::Utf8Path;
+
+use super::source::Source;
 use crate::cli::Compensate;
 use crate::compensate::{Compensated, Target};
 use crate::csv_table::MOST_ROWS;
 use crate::diagnostic::count;
 use crate::files;
 use crate::formats::targets::{self, Row};
-use crate::programs::{self, Cause, Encoding, Instruction, JointOrder, Joints, Language};
+use crate::programs::{self, Cause, Instruction, JointOrder, Joints, Language};
 use crate::robot::Robot;
 
 /// What to do about motions that are not corrected.
 const LEFT_HINT: &str = "`--joint-targets-only` corrects the joint targets and names the motions that it leaves as they are; \
                          their poses can be compensated as a CSV of name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
-const DATA_HINT: &str = "points of inline forms stand in the .dat file of this name: `stereocal compensate NAME.dat --joint-targets-only` corrects \
-                         the joint targets among them; `--joint-targets-only` corrects those in this file and names the motions that it leaves";
+const DATA_HINT: &str = "points of inline forms stand in the .dat file of this name, which is read and corrected with this one where it stands \
+                         beside it; `--joint-targets-only` corrects what is there and names the motions that it leaves";
+const ALONE_HINT: &str = "`--joint-targets-only` corrects them, where everything that uses them is a motion";
+const OF_DATA_HINT: &str = "`stereocal compensate NAME.src`, with this file beside it, corrects both; `--joint-targets-only` corrects them all, where \
+                            everything that uses them is a motion";
 const CSV_HINT: &str =
     "give the targets as a CSV of name,j1_deg,...,jN_deg or name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
 
 /// A robot program, and which of its joint targets it moves by.
 pub(super) struct Program {
-    pub(super) language: Language,
-    pub(super) text: String,
-    pub(super) encoding: Encoding,
+    language: Language,
+    source: Source,
     read: programs::Program,
     moved_by: Vec<usize>,
 }
@@ -34,11 +39,7 @@ impl Program {
         order: &JointOrder,
     ) -> files::Result<Program> {
         let path = &args.targets;
-        let bytes = files::read_text_bytes(path, "robot program", None)?;
         let refuse = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
-        let Some((text, encoding)) = programs::decoded(bytes) else {
-            return Err(refuse("robot program: UTF-16 text".to_owned(), "save it as UTF-8, or as the controller does"));
-        };
         let count = joints.slides.len();
         if let Some(axis) = order.unknown_axis(language) {
             let message = format!(
@@ -47,8 +48,16 @@ impl Program {
             );
             return Err(refuse(message, JointOrder::HINT));
         }
-        let read = programs::Program::read(language, &text, joints)
-            .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))?;
+        let understood = |source: &Source| {
+            programs::Program::read(language, &source.text, joints)
+                .map_err(|message| refuse(message, "`--pulses-per-deg N,N,...`, from the controller's parameters"))
+        };
+        let mut source = Source::read(path)?;
+        let mut read = understood(&source)?;
+        if language.has_data_file(path) && read.motions.iter().any(|m| m.moves_by == Err(Cause::Elsewhere)) {
+            source = source.with_data(path)?;
+            read = understood(&source)?;
+        }
         if !args.joint_targets_only
             && let Some(first) = read.motions.iter().find(|motion| motion.moves_by.is_err())
         {
@@ -66,19 +75,36 @@ impl Program {
             return Err(refuse(message, CSV_HINT));
         }
         if read.motions.is_empty() && !args.joint_targets_only {
+            let is_data = language == Language::Krl && !language.has_data_file(path);
             let message = match moved_by.len() {
                 1 => "1 joint target, but no instruction that moves to it, in this file".to_owned(),
                 count => format!("{count} joint targets, but no instruction that moves to them, in this file"),
             };
-            return Err(refuse(
-                message,
-                "`--joint-targets-only` corrects them, where everything that uses them is a motion",
-            ));
+            return Err(refuse(message, if is_data { OF_DATA_HINT } else { ALONE_HINT }));
         }
         if moved_by.len() > MOST_ROWS {
             return Err(refuse(format!("more than {MOST_ROWS} targets"), "split the program"));
         }
-        Ok(Program { language, text, encoding, read, moved_by })
+        Ok(Program { language, source, read, moved_by })
+    }
+
+    /// The file beside the program that holds points of it.
+    pub(super) fn data_file(&self) -> Option<&Utf8Path> {
+        self.source.data_file()
+    }
+
+    /// The files with the readings that were found, by their names below the results folder.
+    pub(super) fn corrected(
+        &self,
+        path: &Utf8Path,
+        joints: Joints,
+        found: &[Compensated],
+        in_program: impl Fn(&[f64]) -> Vec<f64>,
+    ) -> Vec<(String, Vec<u8>)> {
+        let changed = self.targets().zip(found);
+        let changed: Vec<_> = changed.filter_map(|(t, f)| Some((t, in_program(f.readings.as_ref().ok()?)))).collect();
+        let files = self.source.corrected(path, (self.language, joints), &changed).into_iter();
+        files.map(|(path, bytes)| (format!("compensated/{}", path.file_name().unwrap_or("program")), bytes)).collect()
     }
 
     /// The joint targets that are corrected, in the order of the text.
@@ -91,7 +117,7 @@ impl Program {
         let row = |t: &programs::Target| {
             let given = order.of_robot(&t.readings);
             let target = Target::Readings(targets::radians(&given, nominal));
-            Row { name: t.name.clone(), line: t.line, target, given: Some(given) }
+            Row { name: t.name.clone(), line: self.source.line(t.line), target, given: Some(given) }
         };
         self.targets().map(row).collect()
     }

@@ -1,6 +1,5 @@
 //! What `compensate` says of its targets: the JSON file and the lines on the terminal.
 
-use camino::Utf8Path;
 use serde::Serialize;
 
 use super::pair::Pair;
@@ -100,7 +99,7 @@ impl Moved {
 }
 
 /// The lines on the terminal.
-pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction]>, written: &Utf8Path) -> String {
+pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction]>, written: &str) -> String {
     let mut text = pair.same.as_ref().map_or_else(String::new, |same| format!("{same}\n"));
     text += &format!("{} of {} compensated: {written}\n", summary.compensated, count(summary.targets, "target"));
     if let Some(motions) = motions {

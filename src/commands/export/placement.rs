@@ -1,5 +1,7 @@
 //! `stereocal export placement`: where the cameras stand, for other programs.
 
+use camino::Utf8Path;
+
 use super::super::heed::heed;
 use super::super::{Outcome, Result};
 use crate::cli::{ExportPlacement, PlacementFormat};
@@ -13,6 +15,9 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
     let out = OutDir::open(args.files.out.as_deref().unwrap_or(&config.out))?;
     let path = args.placement.clone().unwrap_or_else(|| out.or_usual(PLACEMENT, &config.out));
     let file = PlacementFile::read(&path)?;
+    if file.mirrored {
+        return Err(mirrored(&path).into());
+    }
     let groups = groups(args, &file)?;
     let status = heed(file.check.as_ref(), &path);
     let out = out.for_run(&Run { force: args.files.force, ..run }, &[&path]);
@@ -26,7 +31,9 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
     for group in &groups {
         let Some(base_from_camera) = group.base_from_rig.transform() else { continue };
         // A camera that stood in several places is several frames.
-        let suffix = if file.groups.len() > 1 { format!("_{}", plain(&group.group)) } else { String::new() };
+        let rows = group.rows.as_ref().map(|[first, last]| format!("_{}_to_{}", plain(first), plain(last)));
+        let place = || format!("_{}{}", plain(&group.group), rows.unwrap_or_default());
+        let suffix = if file.groups.len() > 1 { place() } else { String::new() };
         let frames = Frames {
             base: args.base_frame.clone(),
             flange: args.flange_frame.clone(),
@@ -55,6 +62,16 @@ pub fn run(args: &ExportPlacement, config: &Config, run: Run) -> Result<Outcome>
     };
     stdout.push_str(&format!("{} from {camera_frame}{target}, in {unit}\n{note}", args.base_frame));
     Ok(Outcome { stdout, status })
+}
+
+/// Of points in a left-handed frame: the frames of other programs are right-handed.
+fn mirrored(path: &Utf8Path) -> config::Error {
+    config::Error::Usage {
+        message: format!(
+            "{path} places points whose x was negated, for those of the file were mirrored (left-handed): the frame that they were read in has no place"
+        ),
+        hint: "negate the axis that is wrong in the table, as the instrument's own programs then show it, and run `stereocal locate` with that".to_owned(),
+    }
 }
 
 /// The groups that are asked for.

@@ -1,11 +1,11 @@
 //! `stereocal verify`: Table 3 of the paper for robots from anywhere; nothing of them is fitted, only the sensor's placement.
 //!
 //! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
-//! sessions get placements of their own. The robots are those of their files.
+//! sessions get placements of their own. The robots are those of their files, and each takes the rows as it counts its joints.
 
 mod recheck;
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
 use super::{Outcome, Result, beyond};
@@ -99,25 +99,53 @@ fn fitted_to(file: &Utf8Path, rows: &[Measurement]) -> Option<String> {
     })
 }
 
-/// The set as the examination mends it, its findings said, and whether rows and robots are what their files say and something explains the errors.
-/// Signs and zeros of joints are mended in the rows, so that all robots are judged by the same, or else in the first robot.
-fn examined(set: &Dataset, file: &Utf8Path, robot: &mut Robot, settings: &identify::Settings) -> (Dataset, bool) {
-    let Examined { set, robot: mended, along, findings, against, unexplained } =
+/// What the examination makes of the rows.
+struct Rows {
+    set: Dataset,
+    /// The same with signs and zeros of joints mended for the first robot, where it counts them otherwise than they are written.
+    counted: Option<Dataset>,
+    /// Whether rows and robots are what their files say and something explains the errors.
+    is_sound: bool,
+}
+
+/// The set as the examination mends it, its findings said. What is wrong with links is mended in the first robot.
+fn examined(set: &Dataset, file: &Utf8Path, robot: &mut Robot, settings: &identify::Settings) -> Rows {
+    let Examined { set, robot: mended, along, findings, against, unexplained, .. } =
         examine::examine(set, robot, settings, &|_| {});
     let is_sound = unexplained.is_none() && against.is_empty() && mended == *robot;
     let of_rows = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along));
     for finding in against.into_iter().chain(findings).chain(unexplained).chain(of_rows) {
         progress::warn(finding.sentence());
     }
-    let of_rows = on_rows::mended(&set, robot, &mended);
-    let set = of_rows.unwrap_or_else(|| {
+    if mended == *robot {
+        return Rows { set, counted: None, is_sound };
+    }
+    let counted = on_rows::mended(&set, robot, &mended);
+    if counted.is_none() {
         progress::warn(format!(
             "the figures of {file} are those with this correction, those of other robots are without it"
         ));
         *robot = mended;
-        set
-    });
-    (set, is_sound)
+    }
+    Rows { set, counted, is_sound }
+}
+
+impl Rows {
+    /// As each robot takes them.
+    fn taken(&self, robots: &[(&Utf8PathBuf, Robot)], settings: &identify::Settings) -> Vec<&Dataset> {
+        let Some(counted) = &self.counted else { return vec![&self.set; robots.len()] };
+        let of = |(k, (file, robot)): (usize, &(&Utf8PathBuf, Robot))| {
+            let taken = if k == 0 { counted } else { on_rows::taken(&self.set, counted, robot, settings) };
+            if !std::ptr::eq(taken, counted) {
+                progress::note(format!(
+                    "mended for {}; {file} counts its joints as the rows do, which are taken as they are written",
+                    robots[0].0
+                ));
+            }
+            taken
+        };
+        robots.iter().enumerate().map(of).collect()
+    }
 }
 
 /// What the user must know of the rows.
@@ -140,6 +168,21 @@ fn tell(set: &Dataset, folded: bool, only_verify: bool) {
     }
 }
 
+/// The rows, whose targets stand where the identification of one of the robots found them, or as the first robot joins them.
+fn of_rows(args: &Verify, rows: &[Measurement], first: Option<&Robot>) -> Result<Dataset> {
+    let of_places = args.robot.iter().find_map(|file| targets::of_places(rows, &known::places_mm(file)));
+    let mut set = match (of_places, first) {
+        (Some((rows, targets)), _) => Dataset::of_rows(&rows, Some(targets))?,
+        (None, Some(robot)) => Dataset::of_robot(rows, robot)?,
+        (None, None) => Dataset::new(rows)?,
+    };
+    still::check_points(&set)?;
+    if let Some(path) = &args.known_distances {
+        set.known = distances::read(path, &set)?;
+    }
+    Ok(set)
+}
+
 pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
         return recheck::run(args, against, config, run);
@@ -159,41 +202,37 @@ pub fn run(args: &Verify, config: &Config, run: Run) -> Result<Outcome> {
     }
     args.robot.iter().filter_map(|file| fitted_to(file, &rows)).for_each(progress::warn);
     let only_verify = place_by_verify_rows(&mut rows);
-    let of_places = args.robot.iter().find_map(|file| targets::of_places(&rows, &known::places_mm(file)));
-    let mut set = match (of_places, robots.first()) {
-        (Some((rows, targets)), _) => Dataset::of_rows(&rows, Some(targets))?,
-        (None, Some((_, robot))) => Dataset::of_robot(&rows, robot)?,
-        (None, None) => Dataset::new(&rows)?,
+    let set = of_rows(args, &rows, robots.first().map(|(_, robot)| robot))?;
+    let rows = match robots.first_mut() {
+        Some((file, robot)) => examined(&set, file, robot, settings),
+        None => Rows { set, counted: None, is_sound: true },
     };
-    still::check_points(&set)?;
-    if let Some(path) = &args.known_distances {
-        set.known = distances::read(path, &set)?;
-    }
-    let mut is_sound = true;
-    if let Some((file, robot)) = robots.first_mut() {
-        (set, is_sound) = examined(&set, file, robot, settings);
-    }
+    let (set, taken) = (&rows.set, rows.taken(&robots, settings));
     let folded = !only_verify && set.verify_rows().is_empty();
     let (fitted, judged) = match only_verify || folded {
         true => (set.rows(|_| true), set.rows(|pose| pose.role != Role::Center)),
         false => (set.fit_rows(), set.verify_rows()),
     };
-    tell(&set, folded, only_verify);
-    robots.iter().filter_map(|(file, robot)| beyond::ranges(file, robot, &set, &judged)).for_each(progress::warn);
-    let judge = Judge::plain(&set, &fitted, settings.wire_offset);
-    let strays = strays::find(&judge, &robots.iter().map(|(_, robot)| robot).collect::<Vec<_>>(), &judged);
-    strays.iter().for_each(|strays| progress::warn(strays.statement(&set)));
+    tell(set, folded, only_verify);
+    let as_taken = || robots.iter().zip(&taken).map(|((file, robot), set)| (file, robot, *set));
+    as_taken().filter_map(|(file, robot, set)| beyond::ranges(file, robot, set, &judged)).for_each(progress::warn);
+    let judge = Judge::plain(set, &fitted, settings.wire_offset);
+    let each: Vec<&Robot> = robots.iter().map(|(_, robot)| robot).collect();
+    let strays = strays::find(&judge, (&each, &taken), &judged);
+    strays.iter().for_each(|strays| progress::warn(strays.statement(set)));
     let far = strays.as_ref().map_or(&[][..], |strays| &strays.rows);
-    let robots: Vec<RobotVerified> =
-        robots.iter().map(|(file, robot)| RobotVerified::new(file, robot, (&judge, &judged, folded), far)).collect();
-    if robots.iter().all(|robot| robot.verify.is_empty()) {
+    let verified = |(file, robot, set): (&&Utf8PathBuf, &Robot, &Dataset)| {
+        RobotVerified::new(file, robot, (&Judge { set, ..judge.clone() }, &judged, folded), far)
+    };
+    let verified: Vec<RobotVerified> = as_taken().map(verified).collect();
+    if verified.iter().all(|robot| robot.verify.is_empty()) {
         return Err(identify::Error::NothingJudged { rows: judged.len(), needed: PLACED_BY_ITSELF }.into());
     }
     let names = strays.as_ref().map_or_else(Vec::new, |strays| set.names(&strays.rows));
-    let status = if is_sound && strays.is_none() { Status::Done } else { Status::OutOfTolerance };
+    let status = if rows.is_sound && strays.is_none() { Status::Done } else { Status::OutOfTolerance };
     let stdout = match args.json {
-        true => files::to_json(&Verified { robots, strays: names }),
-        false => table(&robots, folded, &names),
+        true => files::to_json(&Verified { robots: verified, strays: names }),
+        false => table(&verified, folded, &names),
     };
     Ok(Outcome { stdout, status })
 }

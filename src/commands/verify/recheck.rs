@@ -6,7 +6,7 @@ use super::super::beyond::{self, Outside};
 use super::super::identify::{check_joints, read, source};
 use super::super::{Outcome, Result};
 use crate::cli::Verify;
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
 use crate::files::provenance::Run;
@@ -36,7 +36,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     check_joints(&robot, &rows, &args.measurements[0])?;
     let own = Own::among(&mut rows, against);
     let (set, is_mended) = mended(of_targets(&rows, against)?, &robot, before.p95_mm, config)?;
-    let stood = PlacementFile::read(&against.with_file_name(PLACEMENT)).ok();
+    let stood = stood(args.placement.as_deref(), against, &set)?;
     let placed = |group: &str| stood.as_ref()?.sensor_from_base(group, &robot.ends.root_from_frame0);
     let out = opened(args, against, config, run, &source.paths())?;
     out.check_free(&["verify.json", HISTORY, "verify.html"])?;
@@ -53,9 +53,9 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let of_own = own.statement().or(whole.map(str::to_owned)).map(said);
     let skipped = set.skipped.iter().map(|pose| format!("pose {} is not compared: {}", pose.pose, pose.reason));
     let beyond = beyond::ranges(against, &robot, &set, &set.rows(|_| true));
-    let advice = check.as_ref().and_then(|check| check.warning(against));
+    let advised = check.as_ref().and_then(|check| check.warning(against));
     let warnings: Vec<String> =
-        advice.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).chain(beyond).collect();
+        advised.into_iter().chain(is_mended.clone()).chain(shift).chain(of_own).chain(skipped).chain(beyond).collect();
     warnings.iter().for_each(progress::warn);
     // A change that is smaller than what the robot was off by anyway is none to act on.
     let tolerance_mm = args.tolerance_mm.unwrap_or(config.tolerance_mm.max(before.p95_mm));
@@ -73,23 +73,51 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
         seen_mm: found.seen_mm,
         length_mm: None,
     });
-    let advised_against = check.is_some_and(|check| check.advice == Advice::DoNotUse);
-    let judged = Judged { standing, tolerance_mm, advised_against, is_mended: is_mended.is_some() };
+    let advice = check.map_or(Advice::Use, |check| check.advice);
+    let judged = Judged { standing, tolerance_mm, advice, is_mended: is_mended.is_some() };
     let page = report::robot_recheck::page(&found, judged, &checks, &warnings)?;
     let json = out.write_json("verify.json", &content)?;
     out.write(HISTORY, formats::to_csv(&checks, "poses").as_bytes())?;
     report::page::write(&out, "verify.html", page)?;
     let summary = || report::robot_recheck::summary(&found, judged, checks.len(), &out);
-    let least = if advised_against || is_mended.is_some() { Status::OutOfTolerance } else { Status::Done };
+    let least = if is_mended.is_some() { Status::OutOfTolerance } else { advice.status() };
     let status = standing.status().or_worse(least);
     Ok(Outcome { stdout: if args.json { json } else { summary() }, status })
 }
 
 /// The results folder of a run that reads these files and the robot.
 fn opened(args: &Verify, against: &Utf8Path, config: &Config, run: Run, paths: &[Utf8PathBuf]) -> Result<OutDir> {
-    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).collect();
+    let placement = args.placement.as_deref();
+    let inputs: Vec<&Utf8Path> = paths.iter().map(Utf8PathBuf::as_path).chain([against]).chain(placement).collect();
     let run = Run { force: args.force, ..run };
     Ok(OutDir::open(args.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs))
+}
+
+/// Where the sensor stood: as the file says that is named, which must have a group of these rows, or one beside the robot, where it is there.
+fn stood(named: Option<&Utf8Path>, against: &Utf8Path, set: &Dataset) -> Result<Option<PlacementFile>> {
+    let path = named.map_or_else(|| against.with_file_name(PLACEMENT), Utf8Path::to_owned);
+    let file = match PlacementFile::read(&path) {
+        Ok(file) => file,
+        Err(_) if named.is_none() => return Ok(None),
+        Err(e) => return Err(e.into()),
+    };
+    if file.mirrored != set.mirrored {
+        let (placed, rows) = if file.mirrored { ("", " not") } else { (" not", "") };
+        progress::warn(format!(
+            "{path} is{placed} of points whose x was negated, and these are{rows}: where the sensor stands is not compared"
+        ));
+        return Ok(None);
+    }
+    let [placed, rows]: [Vec<&str>; 2] = [
+        file.groups.iter().map(|group| group.group.as_str()).collect(),
+        set.groups.iter().map(|group| group.name.as_str()).collect(),
+    ];
+    if named.is_none() || rows.iter().any(|name| placed.contains(name)) {
+        return Ok(Some(file));
+    }
+    let problem =
+        format!("--placement {path} is of group {}, and the rows are of {}", placed.join(", "), rows.join(", "));
+    Err(config::Error::Invalid { problems: vec![problem] }.into())
 }
 
 /// The rows, whose targets stand where the robot's identification found them.
@@ -137,7 +165,10 @@ fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(
     Ok(match on_rows::of_known(&set, robot, p95_mm, &config.identify) {
         Some(OfKnown { set, finding }) => (
             set,
-            Some(format!("{}; whether the robot was identified from these rows is not known", finding.sentence())),
+            Some(format!(
+                "{}; whether these rows are new, or rows of the identification in another form, cannot be told: only new ones say anything",
+                finding.sentence()
+            )),
         ),
         None => (set, None),
     })

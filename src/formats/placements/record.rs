@@ -28,6 +28,9 @@ pub struct PlacementFile {
     /// Whether an instrument measured that is none of cameras: the "rig" is then the frame of its points.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_instrument: bool,
+    /// Whether the points are left-handed in their file and x of them was negated before they were placed: no transform places them as they are read.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub mirrored: bool,
     /// Placements of the sensor; none where distances were read.
     pub groups: Vec<GroupRecord>,
     /// Where the target sits; `null` where there are no placements.
@@ -43,6 +46,9 @@ pub struct PlacementFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GroupRecord {
     pub group: String,
+    /// The first and the last of its rows, where the sensor moved in between and the group has several placements.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rows: Option<[String; 2]>,
     pub base_from_rig: TransformRecord,
     /// How far the predicted target is to be expected from the true one, at the poses of the group.
     pub error_mm: Lengths,
@@ -64,6 +70,14 @@ pub struct TransformRecord {
 pub struct Held {
     pub parameters: Vec<String>,
     pub because: String,
+}
+
+impl GroupRecord {
+    /// The group, and its rows where it has several placements.
+    pub fn name(&self) -> String {
+        let rows = self.rows.as_ref().map(|[first, last]| format!(", rows {first} to {last}"));
+        format!("{}{}", self.group, rows.unwrap_or_default())
+    }
 }
 
 impl TransformRecord {
@@ -106,14 +120,25 @@ impl PlacementFile {
     pub fn new(robot: &str, set: &Dataset, placed: Option<&Placed>, held_out: &[RowError]) -> PlacementFile {
         let group = |placed: &Placed, index: usize| {
             let group = placed.groups[index].0;
+            let (name, rows) = (&set.groups[group].name, set.rows(|pose| pose.group == group));
+            let ends =
+                [rows.first(), rows.last()].map(|row| row.map_or_else(String::new, |&r| set.poses[r].name.clone()));
+            let is_cut = set.groups.iter().filter(|other| other.name == *name).count() > 1;
             let of_group = held_out.iter().filter(|e| set.poses[e.row].group == group);
             let sensor = placed.sensor_from_base(index).inverse().after(&placed.robot.ends.root_from_frame0);
-            GroupRecord {
-                group: set.groups[group].name.clone(),
+            let record = GroupRecord {
+                group: name.clone(),
+                rows: is_cut.then_some(ends),
                 base_from_rig: TransformRecord::new(&sensor, true, true),
                 error_mm: placed.expected(set, index),
                 held_out: Spread::new(of_group.filter_map(|e| e.point_mm.map(|p| p.norm()))),
-            }
+            };
+            (rows.first().copied(), record)
+        };
+        let groups = |placed: &Placed| {
+            let mut groups: Vec<_> = (0..placed.groups.len()).map(|index| group(placed, index)).collect();
+            groups.sort_by_key(|(row, _)| *row);
+            groups.into_iter().map(|(_, record)| record).collect()
         };
         let target = |placed: &Placed| {
             let target = placed.target().after(&placed.robot.ends.last_frame_from_flange.inverse());
@@ -123,7 +148,8 @@ impl PlacementFile {
             robot: robot.to_owned(),
             check: None,
             by_instrument: !set.is_of_cameras(),
-            groups: placed.map_or_else(Vec::new, |p| (0..p.groups.len()).map(|index| group(p, index)).collect()),
+            mirrored: set.mirrored,
+            groups: placed.map_or_else(Vec::new, groups),
             flange_from_target: placed.map(target),
             covariance_order: ["rx", "ry", "rz", "tx", "ty", "tz"].map(str::to_owned),
             poses: region(set),
@@ -131,9 +157,9 @@ impl PlacementFile {
         }
     }
 
-    /// Where a group's sensor stood, as the chain has it; `None` of a group that is not there.
+    /// Where a group's sensor stood, of several places the last, as the chain has it; `None` of a group that is not there.
     pub fn sensor_from_base(&self, group: &str, root_from_frame0: &Transform) -> Option<Uncertain> {
-        let record = &self.groups.iter().find(|g| g.group == group)?.base_from_rig;
+        let record = &self.groups.iter().rfind(|g| g.group == group)?.base_from_rig;
         let entries: Option<Vec<f64>> = record.covariance.iter().flatten().copied().collect();
         let root_from_rig =
             Uncertain { transform: record.transform()?, covariance: Matrix6::from_row_slice(&entries?) };

@@ -127,6 +127,8 @@ pub struct Dataset {
     pub files: Vec<String>,
     /// The unit of lengths that was typed, where one was.
     pub typed_unit: Option<Unit>,
+    /// Whether x of the points is negated against the file, whose frame is left-handed.
+    pub mirrored: bool,
 }
 
 /// A known distance between the points that two groups touched.

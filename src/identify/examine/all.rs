@@ -19,6 +19,8 @@ pub struct Examined {
     pub along: Along,
     /// What was wrong, and what was done.
     pub findings: Vec<Finding>,
+    /// Those of them by which readings or joints are not taken as they are written.
+    pub mended: Vec<Finding>,
     /// What was mended and yet speaks against the file.
     pub against: Vec<Finding>,
     /// Errors that nothing explained so far.
@@ -29,13 +31,14 @@ pub struct Examined {
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
     step("units, signs and conventions");
     let (mut set, mut robot, mut findings, mut against) = (set.clone(), robot.clone(), Vec::new(), Vec::new());
-    let mut unexplained_mm = None;
+    let (mut unexplained_mm, mut mended) = (None, Vec::new());
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
         let (of_rows, of_orientations, of_known);
         (set, of_rows) = shifted::examine(&set, &robot);
         Mended { set, robot, findings, against, unexplained_mm } = conventions::examine(&set, &robot, settings);
         findings.splice(0..0, of_rows);
+        mended.clone_from(&findings);
         (set, of_orientations) = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         (set, of_known) = known::examine(&set, &robot, settings);
         findings.extend(of_orientations);
@@ -68,5 +71,5 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     }
     findings.splice(0..0, of_targets);
     let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(conventions::unexplained);
-    Examined { set, robot, along, findings, against, unexplained }
+    Examined { set, robot, along, findings, mended, against, unexplained }
 }

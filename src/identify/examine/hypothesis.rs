@@ -174,6 +174,11 @@ impl Hypothesis {
                 )
             }
             Hypothesis::StandardDh => "the robot file: `robot import TABLE --dh classic` reads such rows".to_owned(),
+            Hypothesis::Mirrored => {
+                "the table, of which x is negated here and in what is placed: whether x, y or z is the wrong one the \
+                                     readings do not tell"
+                    .to_owned()
+            }
             _ => "the table".to_owned(),
         }
     }
@@ -206,7 +211,10 @@ impl Hypothesis {
             Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
             Hypothesis::Lagging(joint, by) => set = lagging(set, joint, by),
             Hypothesis::StandardDh => robot = from_standard(&robot),
-            Hypothesis::Mirrored => set.poses.iter_mut().for_each(mirror),
+            Hypothesis::Mirrored => {
+                set.mirrored = !set.mirrored;
+                set.poses.iter_mut().for_each(mirror);
+            }
         }
         (set, robot)
     }

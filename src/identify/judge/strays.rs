@@ -1,6 +1,6 @@
 //! Rows that are so far off a robot that is not fitted that they are no errors of it: a misread point, the joints of another row.
 //!
-//! In: robots, the rows that place the sensor and those that are judged. Out: the rows that are many times as far off as most, by the robot that is
+//! In: robots, each with the rows as it takes them, those that place the sensor and those that are judged. Out: the rows that are many times as far off as most, by the robot that is
 //! nearest, and whether the readings of two of them are exchanged. Method: placements by the four fifths of each group's rows that come nearest
 //! (the concentration steps of Rousseeuw and Van Driessen, 1999). Goes wrong: robots that are off by as much as the strays, and strays that are more
 //! than a fifth of the rows: then none is named.
@@ -77,22 +77,22 @@ fn nearest(judge: &Judge, robot: &Robot) -> Vec<usize> {
     placing
 }
 
-/// Looks for strays among rows that place the sensor and these.
-pub fn find<'r>(judge: &Judge, robots: &[&'r Robot], judged: &[usize]) -> Option<Strays> {
+/// Looks for strays among rows that place the sensor and these; `sets` are the same rows as each robot takes them.
+pub fn find(judge: &Judge, (robots, sets): (&[&Robot], &[&Dataset]), judged: &[usize]) -> Option<Strays> {
     if (0..judge.set.poses.len()).any(|row| judge.set.touches(row)) {
         return None;
     }
     let mut rows = [judge.fitted, judged].concat();
     rows.sort_unstable();
     rows.dedup();
-    let of_robot = |&robot: &&'r Robot| {
-        let placing = nearest(judge, robot);
-        let sizes = sizes(judge, robot, &placing, &rows);
+    let all = robots.iter().zip(sets).filter_map(|(&robot, &set)| {
+        let judge = Judge { set, ..judge.clone() };
+        let placing = nearest(&judge, robot);
+        let sizes = sizes(&judge, robot, &placing, &rows);
         let median_mm = median(sizes.iter().map(|(_, size)| *size))?;
-        Some((median_mm, sizes, placing, robot))
-    };
-    let all = robots.iter().filter_map(of_robot);
-    let (median_mm, sizes, placing, robot) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((median_mm, sizes, placing, robot, judge))
+    });
+    let (median_mm, sizes, placing, robot, judge) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let limit_mm = FAR * median_mm.max(REPEATABILITY_MM);
     let far: Vec<(usize, f64)> = sizes.iter().copied().filter(|(_, size)| *size > limit_mm).collect();
     if far.is_empty() || far.len() * SHARE > sizes.len() {
@@ -101,7 +101,7 @@ pub fn find<'r>(judge: &Judge, robots: &[&'r Robot], judged: &[usize]) -> Option
     let rows: Vec<usize> = far.iter().map(|(row, _)| *row).collect();
     let most_mm = far.iter().map(|(_, size)| *size).fold(0.0, f64::max);
     let exchanged = match rows[..] {
-        [a, b] => are_exchanged(judge, robot, &placing, [a, b], limit_mm),
+        [a, b] => are_exchanged(&judge, robot, &placing, [a, b], limit_mm),
         _ => false,
     };
     Some(Strays { rows, most_mm, median_mm, exchanged })
@@ -132,7 +132,8 @@ mod tests {
         spoil(&mut world.rows);
         let set = Dataset::new(&world.rows).unwrap();
         let rows = set.rows(|_| true);
-        let strays = find(&Judge::plain(&set, &rows, false), &[&world.nominal, &world.truth], &rows);
+        let robots = [&world.nominal, &world.truth];
+        let strays = find(&Judge::plain(&set, &rows, false), (&robots, &[&set, &set]), &rows);
         (set, strays)
     }
 

@@ -20,7 +20,7 @@ pub(super) fn section(placement: &PlacementFile, by_cameras: bool) -> Markup {
         return html! {};
     }
     let groups = placement.groups.iter().map(|group| {
-        let name = format!("base from {}, {}", if by_cameras { "rig" } else { "instrument" }, group.group);
+        let name = format!("base from {}, {}", if by_cameras { "rig" } else { "instrument" }, group.name());
         let [mean, p95] = [group.error_mm.mean_mm, group.error_mm.p95_mm].map(two_digits);
         row(name, &group.base_from_rig, [mean, p95, short(group.held_out.mean_abs_mm)])
     });
