@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::parameters::{Identifiability, MethodRecord};
 use super::quality::Quality;
+use crate::diagnostic::Status;
 use crate::identify::data::dataset::Skipped;
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::targets::Targets;
@@ -38,6 +39,12 @@ pub struct Record {
     /// Whether to use the robot that was found.
     pub advice: Advice,
     pub reason: String,
+    /// Whether links are farther from the file's than any maker's tolerance, which is to be looked at first.
+    #[serde(skip)]
+    pub is_beyond: bool,
+    /// Whether the points are no instrument's.
+    #[serde(skip)]
+    pub is_computed: bool,
     /// In plain words, the gravest first.
     pub warnings: Vec<String>,
     /// Poses that fit far worse than the rest and were left out.
@@ -119,6 +126,11 @@ impl Record {
         let of_joints = self.doctor.iter().filter(|finding| finding.of_joints);
         let mended = of_joints.map(Finding::sentence).collect();
         Check { advice: self.advice, reason: self.reason.clone(), mended }
+    }
+
+    /// What the command ends with.
+    pub fn status(&self) -> Status {
+        if self.is_beyond { Status::OutOfTolerance } else { self.advice.status() }
     }
 
     pub fn chosen_method(&self) -> Option<&MethodRecord> {
