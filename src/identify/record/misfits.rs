@@ -108,10 +108,9 @@ mod tests {
     use crate::robot::Advice;
 
     fn judged(spoil: impl Fn(&mut World, &[usize])) -> (Record, String) {
-        let mut world = planned(80, 0, 25.0, 0.02, 5, &|_| {});
-        world.rows.retain(|row| row.at.role == Role::Sample);
-        world.rows.sort_by(|a, b| a.at.group.cmp(&b.at.group));
-        // Twelve rows of one placement.
+        let mut world = planned(240, 0, 25.0, 0.02, 5, &|_| {});
+        world.rows.retain(|row| row.at.group == "g1" && row.at.role == Role::Sample);
+        // Twelve of sixty rows.
         let rows: Vec<usize> = (24..36).collect();
         spoil(&mut world, &rows);
         let (set, found) = world.identified(&world.rows);
@@ -130,13 +129,13 @@ mod tests {
             rows.iter().for_each(|&row| *point(&mut world.rows[row]) += Vector3::new(0.9, -1.1, 1.3));
         });
         assert_eq!(record.advice, Advice::Check, "{:?}", record.warnings);
-        assert!(said.contains("12 rows (15 %), one unbroken block of the table,"), "{said}");
+        assert!(said.contains("12 rows (20 %), one unbroken block of the table,"), "{said}");
         assert!(said.contains("one cause for all") && !said.contains("has that of"), "{said}");
         // Two of them are errors of their own.
         let (record, said) = judged(|world, rows| {
             [rows[0], rows[7]].iter().for_each(|&row| *point(&mut world.rows[row]) += Vector3::new(3.0, -2.0, 1.0));
         });
-        assert_eq!(record.advice, Advice::Use, "{:?}", record.warnings);
+        assert!(!record.reason.contains("far worse than the rest"), "{}", record.reason);
         assert!(said.contains("2 rows") && !said.contains("block") && !said.contains("has that of"), "{said}");
     }
 

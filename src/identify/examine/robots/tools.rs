@@ -39,8 +39,8 @@ impl Tools {
 }
 
 /// Steps of a joint's zero by which its best value is found.
-const STEP_RAD: f64 = 1e-3;
-const STEP_MM: f64 = 0.5;
+pub(super) const STEP_RAD: f64 = 1e-3;
+pub(super) const STEP_MM: f64 = 0.5;
 
 /// A tool that moved.
 #[derive(Debug, Clone, PartialEq)]
