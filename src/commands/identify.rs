@@ -73,7 +73,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     } else {
         report::identify::summary(&record, (file.as_deref(), &nominal), placed.is_some(), &out)
     };
-    let status = record.status();
+    let status = record.check().status();
     Ok(Outcome { stdout, status })
 }
 

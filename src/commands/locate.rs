@@ -83,7 +83,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
 /// What the points say of the robot's use; `None` where they agree with it.
 fn of_points(fit: &Fit) -> Option<Check> {
     let advice = if fit.contradicted { Advice::DoNotUse } else { Advice::Check };
-    Some(Check { advice, reason: fit.objection()?, mended: Vec::new() })
+    Some(Check { advice, reason: fit.objection()?, out_of_tolerance: false, mended: Vec::new() })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.

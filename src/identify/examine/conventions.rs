@@ -155,7 +155,10 @@ fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>) ->
             mend.push(place);
         }
     }
-    format!("mended for this run; mend {} (`examine = false` in [identify] takes it as it is)", mend.join(", or "))
+    format!(
+        "mended for this run; mend {} (`examine = false` in [identify] takes it as it is)",
+        mend.join("; or, for the other cause, ")
+    )
 }
 
 /// What is said of errors that no hypothesis explains, of the fit that left them.

@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::parameters::{Identifiability, MethodRecord};
 use super::quality::Quality;
-use crate::diagnostic::Status;
 use crate::identify::data::dataset::Skipped;
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::targets::Targets;
@@ -125,12 +124,7 @@ impl Record {
     pub fn check(&self) -> Check {
         let of_joints = self.doctor.iter().filter(|finding| finding.of_joints);
         let mended = of_joints.map(Finding::sentence).collect();
-        Check { advice: self.advice, reason: self.reason.clone(), mended }
-    }
-
-    /// What the command ends with.
-    pub fn status(&self) -> Status {
-        if self.is_beyond { Status::OutOfTolerance } else { self.advice.status() }
+        Check { advice: self.advice, reason: self.reason.clone(), out_of_tolerance: self.is_beyond, mended }
     }
 
     pub fn chosen_method(&self) -> Option<&MethodRecord> {
