@@ -73,7 +73,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     } else {
         report::identify::summary(&record, (file.as_deref(), &nominal), placed.is_some(), &out)
     };
-    let status = record.advice.status();
+    let status = record.check().status();
     Ok(Outcome { stdout, status })
 }
 
@@ -104,12 +104,13 @@ fn search(
     Ok((identify(set, nominal, settings, seed, &step)?, None))
 }
 
-/// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says is not said before it, unless it goes elsewhere.
+/// The gravest warnings on the terminal; the page and the JSON have all. What stands below, in the verdict or beside the method, is not said before it,
+/// unless that goes elsewhere.
 fn said(record: &Record, out: &OutDir, is_json: bool) {
     const MOST: usize = 5;
     for (k, warning) in record.warnings.iter().take(MOST).enumerate() {
         match record.advice {
-            _ if !is_json && warning == record.whole_reason() => {}
+            _ if !is_json && (warning == record.whole_reason() || record.not_run.as_ref() == Some(warning)) => {}
             Advice::DoNotUse if k == 0 => progress::warn(format!("do not use the result: {warning}")),
             _ => progress::warn(warning),
         }

@@ -95,7 +95,12 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
 fn of_rows_and_fit(doubts: &[String], fit: &Fit) -> Option<Check> {
     let advice = if fit.contradicted { Advice::DoNotUse } else { Advice::Check };
     let reasons: Vec<String> = fit.objection().into_iter().chain(doubts.iter().cloned()).collect();
-    (!reasons.is_empty()).then(|| Check { advice, reason: reasons.join("; "), mended: Vec::new() })
+    (!reasons.is_empty()).then(|| Check {
+        advice,
+        reason: reasons.join("; "),
+        out_of_tolerance: false,
+        mended: Vec::new(),
+    })
 }
 
 /// What stands in the results folder that another command made, and that this one replaces.

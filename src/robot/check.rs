@@ -25,6 +25,9 @@ pub struct Check {
     /// Why, in one sentence; empty where there is nothing to say.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub reason: String,
+    /// Whether links are farther from the nominal robot's than any maker builds them, so that whatever is made with both may be off by as much.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub out_of_tolerance: bool,
     /// How the joints of this robot are counted otherwise than the nominal robot's file says, and what to mend: readings for the one mean something
     /// else for the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -42,6 +45,11 @@ impl Advice {
 }
 
 impl Check {
+    /// What a command that found or uses the robot ends with at best.
+    pub fn status(&self) -> Status {
+        if self.out_of_tolerance { Status::OutOfTolerance } else { self.advice.status() }
+    }
+
     /// What a user of `file` must know; `None` where there is nothing to say.
     pub fn warning(&self, file: &Utf8Path) -> Option<String> {
         let reason = &self.reason;

@@ -105,6 +105,24 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
     }
 }
 
+/// A file in which one length is 7 mm off, as of a sister model, fits as well as the right one; targets that are compensated from it would not.
+#[test]
+fn a_length_that_nobody_builds_so_is_named_by_whatever_uses_the_robot() {
+    let folder = identified("robot.toml");
+    let at = folder.path();
+    let robot = std::fs::read_to_string(at.join("robot.toml")).unwrap();
+    for (a_mm, status) in [("-263.0", 0), ("-257.0", 1)] {
+        std::fs::write(at.join("robot.toml"), robot.replace("a_mm = -264.0", &format!("a_mm = {a_mm}"))).unwrap();
+        let found = ["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region", "--force"];
+        let found = stereocal(at, &[&found[..], &["--extensions", "none", "--robot", "robot.toml"]].concat());
+        let (said, named) =
+            (stdout(&found), "links are found farther from the robot file's than makers build them (a_2 -");
+        assert_eq!((found.status.code(), said.contains(named)), (Some(status), status == 1), "{a_mm}: {said}");
+        let (_, of_compensate, said) = used(at).swap_remove(0);
+        assert_eq!((of_compensate, said.contains(named)), (status, status == 1), "{a_mm}: {said}");
+    }
+}
+
 #[test]
 fn a_run_that_fails_says_that_the_results_beside_it_are_older() {
     let folder = identified("robot.toml");

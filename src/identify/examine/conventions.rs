@@ -148,15 +148,24 @@ fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>) ->
     if let (Some(_), Hypothesis::Lengths(.., unit)) = (typed, hypothesis) {
         return format!("`--units {}` says so, if the robot file is the right one", unit.flag());
     }
-    let mend: Vec<String> = iter::once(&hypothesis).chain(others).map(|hypothesis| hypothesis.mend()).collect();
-    format!("mended for this run; mend {} (`examine = false` in [identify] takes it as it is)", mend.join(", or "))
+    let mut mend: Vec<String> = Vec::new();
+    for place in iter::once(&hypothesis).chain(others).map(|hypothesis| hypothesis.mend()) {
+        // The table may stand behind the robot file already.
+        if !mend.iter().any(|said| said.ends_with(&place)) {
+            mend.push(place);
+        }
+    }
+    format!(
+        "mended for this run; mend {} (`examine = false` in [identify] takes it as it is)",
+        mend.join("; or, for the other cause, ")
+    )
 }
 
-/// What is said of errors that no hypothesis explains.
-pub fn unexplained(left_mm: f64) -> Finding {
+/// What is said of errors that no hypothesis explains, of the fit that left them.
+pub fn unexplained(fit: &str, left_mm: f64) -> Finding {
     Finding::new(
         format!(
-            "the best fit leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
+            "{fit} leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
              measured, joints and readings do not belong together, or the readings scatter by as much"
         ),
         "no single change of units, signs or conventions of all rows explains it",

@@ -19,7 +19,7 @@ use std::rc::Rc;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use self::drift::{Creeps, Drift};
+use self::drift::{Drift, Moves};
 use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
@@ -114,7 +114,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     if cut.groups.len() > set.groups.len() {
         along.sessions = list(&cut);
     }
-    along.instead = drift::of_joints(&drifts, robot);
+    along.instead = drift::of_joints(&drifts, robot, set.groups.len() > 1);
     (cut, along)
 }
 
@@ -296,14 +296,31 @@ impl<'a> Search<'a> {
         };
         let ramp = |(joint, fresh): (Option<usize>, &Fresh)| {
             let (gain, amount) = placed.ramp(fresh, &order);
-            (likelihood(fresh, gain), holds(fresh, gain), Creeps { joint, amount })
+            (likelihood(fresh, gain), holds(fresh, gain), Moves { joint, amount, from: None })
         };
-        let ramps: Vec<(f64, bool, Creeps)> = placed.causes().map(ramp).collect();
-        let best = ramps.iter().filter(|(_, holds, _)| *holds).map(|(likely, ..)| *likely).reduce(f64::max)?;
-        let mut alike: Vec<(f64, Creeps)> =
-            ramps.into_iter().filter(|(likely, ..)| best - likely < TOLD_APART).map(|(l, _, c)| (l, c)).collect();
-        alike.sort_by(|a, b| b.0.total_cmp(&a.0));
-        Some(Drift { group: self.name(placed).clone(), causes: alike.into_iter().map(|(_, cause)| cause).collect() })
+        let ramps: Vec<(f64, bool, Moves)> = placed.causes().map(ramp).collect();
+        if !ramps.iter().any(|(_, holds, _)| *holds) {
+            return None;
+        }
+        // What moves evenly is half explained by a step, and a step by what moves evenly. Where the sensor steps, its rows are cut.
+        let steps = placed.causes().filter(|(joint, _)| !is_cut && joint.is_some());
+        let steps = steps.filter_map(|(joint, fresh)| self.step(placed, joint, fresh, &order));
+        let mut all: Vec<(f64, Moves)> =
+            ramps.into_iter().map(|(likely, _, moves)| (likely, moves)).chain(steps).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let best = all.first()?.0;
+        let alike = all.into_iter().take_while(|(likely, _)| best - likely < TOLD_APART);
+        Some(Drift { group: self.name(placed).clone(), causes: alike.map(|(_, cause)| cause).collect() })
+    }
+
+    /// What the zero of a joint that steps at the best row is worth. The row is an unknown more.
+    fn step(&self, placed: &Placed, joint: Option<usize>, fresh: &Fresh, order: &[usize]) -> Option<(f64, Moves)> {
+        let (gain, first) = placed.best_step(fresh, order)?;
+        let mut products = fresh.nothing();
+        order.iter().filter(|&&k| k >= first).for_each(|&k| fresh.add(&mut products, &placed.rows[k].1, 1.0));
+        let from = Some(self.set.poses[placed.rows[first].0].name.clone());
+        let moves = Moves { joint, amount: fresh.amounts(&products)[0], from };
+        Some((self.likelihood(gain, fresh.columns.ncols() + 1), moves))
     }
 
     /// The group of a placement.

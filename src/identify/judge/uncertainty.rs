@@ -128,6 +128,14 @@ impl Expected {
             self.mean_mm, self.max_mm, self.p95_mm
         )
     }
+
+    /// What the mean of it is made of.
+    pub fn parts(&self) -> String {
+        format!(
+            "that holds what readings scatter by ({:.4} mm: instrument, repeatability, what the model lacks); the parameters alone make {:.4} mm",
+            self.scatter_mm, self.of_robot_mm
+        )
+    }
 }
 
 /// Share of a row's own reading in what is predicted there, of which on more is not told from all of it.

@@ -57,7 +57,8 @@ impl Record {
         // Points that nobody measured say nothing of a robot, whatever else is odd about them.
         let computed = || self.computed(set).or_else(|| self.predicted(set, nominal));
         let computed = computed().or_else(|| rounded::as_closely_as_digits(set, found));
-        let mut doubts: Vec<String> = computed.iter().cloned().chain(sentences(&findings.doubts)).collect();
+        let of_data = sentences(findings.beyond.as_slice()).into_iter().chain(sentences(&findings.doubts));
+        let mut doubts: Vec<String> = computed.iter().cloned().chain(of_data).collect();
         doubts.extend(self.implausible(set, nominal));
         // What speaks against the result is why its figures are odd, whatever the number of rows.
         doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty() && far.is_none()));
@@ -71,6 +72,8 @@ impl Record {
             (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
             (None, None, None) => (Advice::Use, String::new()),
         };
+        self.is_beyond = self.advice == Advice::Check && findings.beyond.is_some();
+        self.is_computed = computed.is_some();
         self.warnings = findings.against.iter().chain(&far).map(Finding::sentence).collect();
         self.warnings.extend(worse);
         self.warnings.extend(kept.filter(|_| self.advice != Advice::DoNotUse));
@@ -163,6 +166,8 @@ impl Record {
     fn promise(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
         /// Beyond what leaving a row out costs where unknowns are half of the numbers.
         const SEVERAL: f64 = 3.0;
+        const ANOTHER_STATE: &str = "they were misread, or are of another state of the robot than the fitted rows, as where a joint was mastered \
+                                     anew in between; look at these rows, or measure others";
         /// What is expected holds the scatter of the readings, which the nominal robot's errors hold as well.
         const FAR: f64 = 2.0;
         let (chosen, expected_mm) = (self.chosen_method()?, self.expected.as_ref()?.mean_mm);
@@ -170,8 +175,11 @@ impl Record {
         let held_out_mm = mean(chosen.quality.judged());
         let few = "there are too few rows for so many unknowns; measure more, that bend every joint";
         if let Some(off) = held_out_mm.filter(|off| *off > SEVERAL * expected_mm) {
+            // Where rows are no fewer than half as many more as are needed, what is expected holds what they leave open.
+            let unknowns = chosen.parameters.len() + 6 * set.groups.len();
+            let why = if self.folded || 3 * set.fit_rows().len() < 2 * unknowns { few } else { ANOTHER_STATE };
             return Some(format!(
-                "rows that the fit did not have are off by {off:.3} mm, expected are {expected_mm:.3} mm: {few}"
+                "rows that the fit did not have are off by {off:.3} mm, expected are {expected_mm:.3} mm: {why}"
             ));
         }
         let nominal_mm = self.with_tool_mm(set, nominal).filter(|_| held_out_mm.is_some());

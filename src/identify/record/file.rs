@@ -38,6 +38,12 @@ pub struct Record {
     /// Whether to use the robot that was found.
     pub advice: Advice,
     pub reason: String,
+    /// Whether links are farther from the file's than any maker's tolerance, which is to be looked at first.
+    #[serde(skip)]
+    pub is_beyond: bool,
+    /// Whether the points are no instrument's.
+    #[serde(skip)]
+    pub is_computed: bool,
     /// In plain words, the gravest first.
     pub warnings: Vec<String>,
     /// Poses that fit far worse than the rest and were left out.
@@ -118,7 +124,7 @@ impl Record {
     pub fn check(&self) -> Check {
         let of_joints = self.doctor.iter().filter(|finding| finding.of_joints);
         let mended = of_joints.map(Finding::sentence).collect();
-        Check { advice: self.advice, reason: self.reason.clone(), mended }
+        Check { advice: self.advice, reason: self.reason.clone(), out_of_tolerance: self.is_beyond, mended }
     }
 
     pub fn chosen_method(&self) -> Option<&MethodRecord> {

@@ -11,7 +11,7 @@ use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::pattern;
 use crate::identify::record::file::Smooth;
-use crate::identify::record::{left_out, plausible, rounded};
+use crate::identify::record::{left_out, misfits, plausible, rounded};
 use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
 
@@ -26,6 +26,8 @@ const SMALL: f64 = 10.0;
 pub struct Findings {
     /// What speaks against the result.
     pub against: Vec<Finding>,
+    /// What no maker's tolerance allows and is to be looked at before the result is used.
+    pub beyond: Option<Finding>,
     /// What was changed or left out before anything was fitted.
     pub doubts: Vec<Finding>,
     /// What was found along the way.
@@ -45,22 +47,20 @@ impl Findings {
     ) -> Findings {
         let against: Vec<Finding> = along.robots.clone().into_iter().chain(cause).collect();
         if !against.is_empty() {
-            return Findings { against, doubts: examined, notes: Vec::new() };
+            return Findings { against, doubts: examined, ..Findings::default() };
         }
         let left_mm = found.scatter.point_mm;
         let rounded = rounded::of_joints(set, found);
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
         let far_beyond_mm = FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
-        let beyond_all = || (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained(left_mm));
+        let beyond_all =
+            || (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained("the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
         let is_reached = unexplained.is_none();
-        let errors = |set: &Dataset| {
-            let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
-            judge.errors(found.robot(), &found.outliers)
-        };
-        let left_out = left_out::of_a_joint(set, found.robot(), &found.fitted, &found.outliers, &errors);
+        let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
+        let many = many_left_out(set, found);
         let against: Vec<Finding> = left_out
             .into_iter()
             .chain(of_rounding)
@@ -69,7 +69,8 @@ impl Findings {
             .collect();
         // What is said against the result of some rows need not be said of them twice.
         let is_told = |finding: &Finding| {
-            against.iter().any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
+            let mut told = against.iter().chain(&many);
+            told.any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
         };
         let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
         let notes = noise.into_iter().chain(of_fit).filter(|finding| !is_told(finding)).collect();
@@ -78,22 +79,27 @@ impl Findings {
         let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
             Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
         });
+        // A scale makes every length another.
+        let beyond = plausible::of_links(found).filter(|_| against.is_empty() && scale.is_none());
         let terms = plausible::of_terms(found);
+        let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined
             .into_iter()
             .chain(along.instead.clone())
             .chain(rounded)
-            .chain(of_verify(set, found))
+            .chain(many)
+            .chain(misfits::of_verify(set, found))
             .chain(scale)
             .chain(terms)
             .chain(far_beyond)
             .collect();
-        Findings { against, doubts, notes }
+        Findings { against, beyond, doubts, notes }
     }
 
     /// All of them, the gravest first.
     pub fn all(&self) -> Vec<Finding> {
-        [&self.against, &self.doubts, &self.notes].into_iter().flatten().cloned().collect()
+        let first = self.against.iter().chain(&self.beyond);
+        first.chain(&self.doubts).chain(&self.notes).cloned().collect()
     }
 }
 
@@ -106,6 +112,20 @@ pub fn is_explained(set: &Dataset, found: &Identification) -> bool {
 /// Whether a built robot may have what is left.
 fn is_plausible(found: &Identification) -> bool {
     few_left_out(found) && found.scatter.point_mm < conventions::IMPLAUSIBLE_MM
+}
+
+fn left_out_of_a_joint(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let errors = |set: &Dataset| {
+        let judge = Judge { extras: &found.extras, ..Judge::plain(set, &found.fitted, false) };
+        judge.errors(found.robot(), &found.outliers)
+    };
+    left_out::of_a_joint(set, found.robot(), &found.fitted, &found.outliers, &errors)
+}
+
+/// That so many rows were left out that the robot may be the others' only.
+fn many_left_out(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let is_many = found.formulation().is_some() && !few_left_out(found);
+    is_many.then(|| misfits::left_out(set, found))
 }
 
 fn few_left_out(found: &Identification) -> bool {
@@ -141,47 +161,8 @@ fn spread_mm(set: &Dataset, rows: &[usize]) -> f64 {
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
-    let of_fit = of_rows(set, found).into_iter().chain(plausible::of_another_robot(found));
+    let of_fit = misfits::of_rows(set, found).into_iter().chain(plausible::of_another_robot(found));
     of_fit.chain(of_sensor(found)).chain(along_the_rows(along)).chain(of_data(set, found)).collect()
-}
-
-/// Rows that do not fit with the others.
-fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
-    let share = 100.0 * found.outliers.len() as f64 / (found.fitted.len() + found.outliers.len()).max(1) as f64;
-    let left_out = "left out of the fit (`outlier_sigmas = 0` in [identify] keeps them)";
-    let kinds = [
-        (&found.outliers, format!(" ({share:.0} %)"), "far worse than the rest", left_out),
-        (
-            &found.doubtful,
-            String::new(),
-            "worse than the rest by more than chance allows",
-            "fitted all the same; measure again",
-        ),
-    ];
-    let finding = |(rows, share, how, action): (&Vec<usize>, String, &str, &str)| {
-        let said = match rows.len() {
-            1 => format!("1 row fits {how}"),
-            count => format!("{count} rows{share} fit {how}"),
-        };
-        Finding::new(said, action).about(set.names(rows))
-    };
-    kinds.into_iter().filter(|kind| !kind.0.is_empty()).map(finding).collect()
-}
-
-/// Verify rows that do not fit with the others.
-fn of_verify(set: &Dataset, found: &Identification) -> Option<Finding> {
-    let rows = &found.verify_outliers;
-    let said = match rows.len() {
-        0 => return None,
-        1 => "1 verify row fits far worse than the rest".to_owned(),
-        count => format!("{count} verify rows fit far worse than the rest"),
-    };
-    let action = match (found.strays(set).is_empty(), rows.len()) {
-        (true, _) => "they are counted in the figures; measure them again",
-        (false, 1) => "the figures are without it; measure it again",
-        (false, _) => "the figures are without them; measure them again",
-    };
-    Some(Finding::new(said, action).about(set.names(rows)))
 }
 
 /// Errors that the readings share.
@@ -289,8 +270,11 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     }
     if along.instead.is_none() && !along.drifting.is_empty() {
         add(
-            "the sensor or the robot's base moves evenly along the rows of a group: a drift".to_owned(),
-            along.drifting.clone(),
+            format!(
+                "the sensor or the robot's base moves evenly along the rows of group {}: a drift",
+                along.drifting.join(", ")
+            ),
+            Vec::new(),
             match ranges(&|s| drifts(s)).len() {
                 0 => "nothing was done: the errors of these groups are in the result".to_owned(),
                 parts => format!("the rows were cut into {parts} placements; what moves within each is in the result"),

@@ -56,6 +56,8 @@ impl Record {
             identifiability,
             advice: Advice::Use,
             reason: String::new(),
+            is_beyond: false,
+            is_computed: false,
             warnings: Vec::new(),
             outliers: set.names(&found.outliers),
             strays: set.names(found.strays(set)),

@@ -5,6 +5,7 @@ mod file;
 pub mod findings;
 mod gather;
 mod left_out;
+mod misfits;
 mod parameters;
 mod plausible;
 mod quality;

@@ -4,6 +4,7 @@ use crate::identify::finding::Finding;
 use crate::identify::model::base::sum_name;
 use crate::identify::run::Identification;
 use crate::robot::{Parameter, Robot, Unit};
+use crate::statistics::median;
 
 /// Links that are farther from the file's than they are built.
 pub fn of_another_robot(found: &Identification) -> Option<Finding> {
@@ -19,6 +20,31 @@ pub fn of_another_robot(found: &Identification) -> Option<Finding> {
 /// Whether no link is farther from the file's than robots are built, be it known well or badly.
 pub fn are_of_the_file(found: &Identification) -> bool {
     far(found, &link_limit, 0.0).is_none()
+}
+
+/// Links that are farther from the file's than makers build them, though no other robot's: many times what the other lengths are off by, or more
+/// than any maker's.
+pub fn of_links(found: &Identification) -> Option<Finding> {
+    let each = sums(found, &|parameter| is_length(parameter).then_some(1.0));
+    let usual_mm = median(each.iter().map(|sum| sum.amount.abs() / sum.limit))?;
+    let length_mm = (MANY * usual_mm).clamp(COARSE_MM, NOBODYS_MM);
+    let limit = |parameter: Parameter| match parameter {
+        _ if is_length(parameter) => Some(length_mm),
+        Parameter::Alpha(_) => Some(COARSE_MRAD),
+        _ => link_limit(parameter),
+    };
+    let far = far(found, &limit, FAR_SIGMAS)?;
+    Some(Finding::new(
+        format!(
+            "links are found farther from the robot file's than makers build them ({far}; half of the lengths are within {usual_mm:.1} mm)"
+        ),
+        "compare the robot file with the pendant or the data sheet: where the controller has what was found, mend the file and identify again, for \
+         targets that are compensated from a wrong file become worse",
+    ))
+}
+
+fn is_length(parameter: Parameter) -> bool {
+    matches!(parameter, Parameter::A(_) | Parameter::D(_))
 }
 
 /// Terms that are larger than those of built robots.
@@ -38,6 +64,15 @@ const NEGLIGIBLE: f64 = 0.02;
 
 /// How many standard deviations a correction must have to be far from nominal.
 const FAR_SIGMAS: f64 = 5.0;
+
+/// Times the median of what the lengths are off by beyond which one is not as the others: of a normal distribution five standard deviations.
+const MANY: f64 = 7.4;
+
+/// What the coarsest common tolerance of workshops allows of lengths of one to two metres (ISO 2768-c), and what none does, mm; of real robots the
+/// largest length that is known well is 0.7 mm off. A twist of real ones is up to 12 mrad off.
+const COARSE_MM: f64 = 3.0;
+const NOBODYS_MM: f64 = 5.0;
+const COARSE_MRAD: f64 = 30.0;
 
 /// The correction, mm or mrad, beyond which a link is not the one of the robot's file.
 fn link_limit(parameter: Parameter) -> Option<f64> {
@@ -68,10 +103,12 @@ pub fn links_apart(nominal: &Robot, other: &Robot) -> Option<String> {
 }
 
 /// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or thousandths. Those of the
-/// real robots of the README's table are less than a third of this.
+/// real robots of the README's table are less than a third of this. Gears have whole ratios: what a joint turns too far by is a bent or eccentric
+/// one's, and in no range as much as half a per cent.
 fn term_limit(parameter: Parameter) -> Option<f64> {
     match parameter {
-        Parameter::Harmonic(..) | Parameter::Wobble(..) | Parameter::Coupling(..) => Some(10.0),
+        Parameter::Harmonic(..) | Parameter::Wobble(..) => Some(10.0),
+        Parameter::Coupling(..) => Some(5.0),
         Parameter::Gravity(..) | Parameter::Bending(..) => Some(50.0),
         _ => None,
     }
@@ -79,31 +116,80 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
 
 /// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence.
 fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, sigmas: f64) -> Option<String> {
-    let formulation = found.formulation()?;
+    let is_far = |sum: &Sum| sum.amount.abs() > sum.limit && sum.amount.abs() > sigmas * sum.sigma;
+    let list: Vec<String> = sums(found, limit).into_iter().filter(is_far).map(|sum| sum.said).collect();
+    (!list.is_empty()).then(|| list.join(", "))
+}
+
+/// What poses determine: a parameter's correction, or one of several that act alike.
+struct Sum {
+    /// Its name with the amount in the file's unit.
+    said: String,
+    /// mm or mrad, with the standard deviation, and the size beyond which it is far.
+    amount: f64,
+    sigma: f64,
+    limit: f64,
+}
+
+/// Those of which each part has a limit: a sum with the tool's place in it is the tool's.
+fn sums(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Vec<Sum> {
+    let Some(formulation) = found.formulation() else { return Vec::new() };
     let (covariance, nominal) = (formulation.robot_covariance(), &formulation.rows.kinematics.nominal);
-    let parameters = formulation.parameters();
-    let moved = |p: Parameter| found.robot().value(p) - nominal.value(p);
-    let base = &formulation.base;
+    let (parameters, base) = (formulation.parameters(), &formulation.base);
+    let moved = |i: usize| found.robot().value(parameters[i]) - nominal.value(parameters[i]);
+    let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
     // What poses determine of a link is the sum of it and what acts like it; terms are nothing else's.
     let sum = |row: usize| {
         let is_link = link_limit(parameters[base.free[row]]).is_some();
-        base.sum(row, if is_link { NEGLIGIBLE } else { f64::INFINITY })
+        let parts = base.sum(row, if is_link { NEGLIGIBLE } else { f64::INFINITY });
+        let of = |f: &dyn Fn(usize) -> f64| parts.iter().map(|&(i, c)| c * f(i)).sum::<f64>();
+        // Each may be off by its limit, and they are off independently.
+        let limits = parts.iter().map(|&(i, c)| Some((c * limit(parameters[i])?).powi(2)));
+        let limit = limits.sum::<Option<f64>>()?.sqrt();
+        let (amount, variance) = (of(&moved), of(&|i| of(&|j| covariance[(i, j)])));
+        let (unit, factor) = parameters[parts[0].0].file_unit();
+        let said = format!("{} {:+.1} {unit}", sum_name(&parts, &names), factor * amount);
+        Some(Sum { said, amount, sigma: variance.max(0.0).sqrt(), limit })
     };
-    let is_far = |sum: &Vec<(usize, f64)>| {
-        let of = |f: &dyn Fn(usize) -> f64| sum.iter().map(|&(i, c)| c * f(i)).sum::<f64>();
-        // Each may be off by its limit, and they are off independently; a sum with the tool's place in it is the tool's.
-        let limits: Option<Vec<f64>> = sum.iter().map(|&(i, c)| Some(c * limit(parameters[i])?)).collect();
-        let variance = of(&|i| of(&|j| covariance[(i, j)]));
-        let size = of(&|i| moved(parameters[i])).abs();
-        limits.is_some_and(|limits| size > limits.iter().map(|l| l * l).sum::<f64>().sqrt())
-            && size > sigmas * variance.max(0.0).sqrt()
-    };
-    let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
-    let name = |sum: Vec<(usize, f64)>| {
-        let (unit, factor) = parameters[sum[0].0].file_unit();
-        let amount = factor * sum.iter().map(|&(i, c)| c * moved(parameters[i])).sum::<f64>();
-        format!("{} {amount:+.1} {unit}", sum_name(&sum, &names))
-    };
-    let list: Vec<String> = (0..base.free.len()).map(sum).filter(is_far).map(name).collect();
-    (!list.is_empty()).then(|| list.join(", "))
+    (0..base.free.len()).filter_map(sum).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::examine::sessions::Along;
+    use crate::identify::record::{Findings, Record};
+    use crate::identify::synthetic::{planned, settings};
+    use crate::robot::Advice;
+
+    /// What is said of a robot whose parameter is off by so much more than it is built to, mm or mrad.
+    fn judged(parameter: Parameter, by: f64) -> Record {
+        let world = planned(60, 30, 25.0, 0.02, 5, &|robot| robot.add(parameter, by));
+        let (set, found) = world.identified(&world.rows);
+        let along = Along::default();
+        let findings = Findings::new(Vec::new(), (Vec::new(), None), Vec::new(), &along, &set, &found);
+        Record::new(&set, &world.nominal, &found, &along, findings, &settings(), 1)
+    }
+
+    #[test]
+    fn a_length_of_the_file_that_nobody_builds_so_is_named_with_its_amount() {
+        // Lengths of up to a millimetre, as built, are nobody's mistake; a tool is the user's.
+        for (parameter, by) in [(Parameter::A(2), 0.0), (Parameter::A(2), 1.0), (Parameter::V(2), 9.0)] {
+            let record = judged(parameter, by);
+            assert_eq!((record.advice, record.is_beyond), (Advice::Use, false), "{by}: {:?}", record.warnings);
+        }
+        for (parameter, by, named) in [(Parameter::A(2), -8.0, "a_2 -"), (Parameter::D(3), 6.0, "d_4 +6.")] {
+            let record = judged(parameter, by);
+            assert_eq!((record.advice, record.is_beyond), (Advice::Check, true), "{by}: {:?}", record.warnings);
+            assert!(record.reason.contains(named), "{}", record.reason);
+        }
+        // Farther, and it is another robot's.
+        assert_eq!(judged(Parameter::A(2), 20.0).advice, Advice::DoNotUse);
+    }
+
+    #[test]
+    fn a_joint_that_turns_a_per_cent_too_far_is_no_gears() {
+        let limit = term_limit(Parameter::Coupling(3, 3)).unwrap();
+        assert!((4.0..9.0).contains(&limit), "{limit}");
+    }
 }

@@ -35,19 +35,21 @@ pub fn summary(
     }
     if let Some(expected) = &record.expected {
         lines.push(expected.sentence());
+        lines.push(expected.parts());
         lines.extend(known_near(expected, nominal));
     }
     lines.push(String::new());
     lines.push(kept(record));
-    lines.extend(others(record).or(record.not_run.clone()));
+    lines.extend(others(record));
+    lines.extend(record.not_run.clone());
     lines.extend(sure(record));
     lines.extend(record.repeats.as_ref().map(|repeats| repeats.sentence()));
     lines.extend(record.targets.as_ref().map(|targets| targets.sentence()));
-    lines.extend(record.scale.filter(|scale| !scale.is_significant()).map(|scale| scale.sentence()));
+    lines.extend(of_scale(record));
     let placement = if is_placed { format!(", {}", out.join(PLACEMENT)) } else { String::new() };
     let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
     lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
-    lines.push(format!("next: {}", next(record.advice, robot.map_or("ROBOT", Utf8Path::as_str), file.as_str())));
+    lines.push(format!("next: {}", next(record, robot.map_or("ROBOT", Utf8Path::as_str), file.as_str())));
     lines.join("\n") + "\n"
 }
 
@@ -68,13 +70,17 @@ pub(super) fn advice(record: &Record) -> String {
 }
 
 /// What to do with the robot that was found in `file`.
-fn next(advice: Advice, robot: &str, file: &str) -> String {
-    match advice {
+fn next(record: &Record, robot: &str, file: &str) -> String {
+    match record.advice {
         Advice::Use => format!(
             "`stereocal compensate TARGETS --robot {robot} --identified {file}`, or `stereocal export robot --robot {file} --format urdf`"
         ),
         Advice::Check => format!(
             "look at what is named above; ten new poses say whether it holds: `stereocal verify --measurements NEW.csv --robot {robot} --robot {file}`"
+        ),
+        Advice::KeepNominal if record.is_computed => format!(
+            "measure with an instrument where the robot of {robot} is, and identify by these points; where a table has deviations beside the commanded \
+             points, a measured point is their sum"
         ),
         Advice::KeepNominal => {
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
@@ -83,6 +89,12 @@ fn next(advice: Advice, robot: &str, file: &str) -> String {
             "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the pendant"
         ),
     }
+}
+
+/// How large a scale of the readings may hide; of a result that is not to be used there is nothing that it could be hidden in.
+pub(super) fn of_scale(record: &Record) -> Option<String> {
+    let scale = record.scale.filter(|scale| !scale.is_significant() && record.advice != Advice::DoNotUse)?;
+    Some(scale.sentence())
 }
 
 /// The tool that the nominal robot asks for, where it is far from the file's.

@@ -4,12 +4,15 @@
 //! a compliance of its own times the torque that a weight at the target has about it. The rows whose errors have most of that are under the load at
 //! first, and then those that it brings nearer, until no row changes. One robot with the load in these rows is held against one with the load in
 //! all of them and in none, by Fisher's test and by what is left, as of robots, and against one with any term beyond its links. Goes wrong: loads that move the target by less than about three
-//! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder.
+//! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder. The zero of one
+//! joint, which stands elsewhere in some rows for the play of its gear, is held against the load by likelihood.
 
 use nalgebra::Vector3;
 
 use super::fit::{Left, Points};
+use super::tools::{STEP_MM, STEP_RAD};
 use super::{BEATS, CHANCE, MUCH_LARGER, SHORTEST, Table, by_chance};
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::examine::conventions::IMPLAUSIBLE_MM;
 use crate::identify::finding::Finding;
@@ -47,28 +50,111 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
     rough.left.leave_out_gross(&rows, &mut weights);
     let (least, _) = least_of(&weights);
     let States { loaded, left, moved_mm } = settled(points, &weights, rough.loaded, f64::INFINITY)?;
-    let of_state = |state: bool| rows.iter().copied().filter(|&row| loaded[row] == state).collect::<Vec<usize>>();
-    let (with, without) = (of_state(true), of_state(false));
-    let other = if with.len() < without.len() { with } else { without };
     let apart_mm = left.scatter_mm();
-    let is_told = other.len() >= SHORTEST
+    let is_told = smaller(&loaded).len() >= SHORTEST
         && least.scatter_mm() > (MUCH_LARGER * apart_mm).max(REPEATABILITY_MM)
         && apart_mm < IMPLAUSIBLE_MM
         && by_chance(&left, &least)? * (rows.len() as f64) < CHANCE
         && !table.is_one_beyond_links(std::slice::from_ref(&rows), apart_mm);
-    is_told.then(|| {
-        let by = moved_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
-        let names = set.names(&other.iter().map(|&i| table.rows[i]).collect::<Vec<usize>>());
-        let finding = format!(
-            "{} of {} rows are in another state than the others, as with and without a load that moves the target by up to {by:.2} mm: one state \
-             leaves {:.3} mm a coordinate, two leave {apart_mm:.3} mm",
-            other.len(),
-            rows.len(),
-            least.scatter_mm()
-        );
-        let action = "identify the rows of each state by themselves, or measure again with the load that the robot works with";
-        Finding::new(finding, action).about(names)
-    })
+    if !is_told {
+        return None;
+    }
+    let by = moved_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
+    let what = format!("with and without a load that moves the target by up to {by:.2} mm");
+    let never = points.together(std::slice::from_ref(&rows), &weights);
+    let load = Cause { what, there: loaded, free: left.taken - never.taken, left };
+    let zeros = (0..points.robot.joints.len()).filter_map(|joint| elsewhere(points, joint, &weights, &never));
+    let zero = zeros.min_by(|a, b| a.left.squares.total_cmp(&b.left.squares));
+    let mut causes: Vec<Cause> = zero.into_iter().chain([load]).collect();
+    causes.sort_by(|a, b| b.likelihood().total_cmp(&a.likelihood()));
+    let likeliest = &causes[0];
+    let alike = causes.iter().take_while(|cause| likeliest.likelihood() - cause.likelihood() < TOLD_APART);
+    let what = alike.map(|cause| cause.what.as_str()).collect::<Vec<_>>().join(", or ");
+    let other = smaller(&likeliest.there);
+    let finding = format!(
+        "{} of {} rows are in another state than the others, as {what}: one state leaves {:.3} mm a coordinate, two leave {:.3} mm",
+        other.len(),
+        rows.len(),
+        least.scatter_mm(),
+        likeliest.left.scatter_mm()
+    );
+    let action = "identify the rows of each state by themselves, or measure again with the load that the robot works with, each joint coming from the \
+                  same side";
+    let names = set.names(&other.iter().map(|&i| table.rows[i]).collect::<Vec<usize>>());
+    Some(Finding::new(finding, action).about(names))
+}
+
+/// The rows of the state with fewer of them.
+fn smaller(there: &[bool]) -> Vec<usize> {
+    let of_state = |state: bool| (0..there.len()).filter(|&row| there[row] == state).collect::<Vec<usize>>();
+    let (with, without) = (of_state(true), of_state(false));
+    if with.len() < without.len() { with } else { without }
+}
+
+/// What puts some rows into another state.
+struct Cause {
+    what: String,
+    /// The rows that it is there in.
+    there: Vec<bool>,
+    /// Numbers that it took beyond those of one state.
+    free: f64,
+    left: Left,
+}
+
+impl Cause {
+    /// The logarithm of its likelihood but for a constant: the three coordinates of a row share what the model lacks.
+    fn likelihood(&self) -> f64 {
+        let numbers = 3.0 * self.there.len() as f64;
+        -(numbers * self.left.squares.max(f64::MIN_POSITIVE).ln() + self.free * numbers.ln()) / 6.0
+    }
+}
+
+/// Rounds in which rows change between two places of a joint.
+const ROUNDS_OF_ZERO: usize = 8;
+
+/// A joint that stands elsewhere in some rows, where no row changes any more; `never` is what one state leaves.
+fn elsewhere(points: &Points, joint: usize, weights: &[f64], never: &Left) -> Option<Cause> {
+    let rows: Vec<usize> = (0..weights.len()).collect();
+    let slides = points.robot.joints[joint].slides;
+    let step = if slides { STEP_MM } else { STEP_RAD };
+    let at = |there: &[bool], off: f64| {
+        let mut points = points.clone();
+        rows.iter().filter(|&&row| there[row]).for_each(|&row| points.joints_rad[row][joint] += off);
+        points.together(std::slice::from_ref(&rows), weights)
+    };
+    let moved = |off: f64| -> Vec<Vector3<f64>> {
+        let of_row = |q: &Vec<f64>| {
+            let mut there = q.clone();
+            there[joint] += off;
+            points.robot.target_mm(&there) - points.robot.target_mm(q)
+        };
+        points.joints_rad.iter().map(of_row).collect()
+    };
+    let mut there = by_amount(&never.errors_mm, &moved(step));
+    for _ in 0..ROUNDS_OF_ZERO {
+        // Squares of errors are a parabola of how far it is.
+        let [less, more] = [-step, step].map(|off| at(&there, off).squares - never.squares);
+        let off = (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
+        let left = at(&there, off);
+        let next = nearer(&left.errors_mm, &moved(off), &there);
+        if next == there {
+            let by = if slides { format!("{:.3} mm", off.abs()) } else { format!("{:.3} deg", off.to_degrees().abs()) };
+            let what =
+                format!("where joint {} stands elsewhere by {by}, for play or the side that it came from", joint + 1);
+            return Some(Cause { what, there, free: 1.0, left });
+        }
+        there = next;
+    }
+    None
+}
+
+/// The rows whose errors are smaller where the target is moved so; `there` it is already.
+fn nearer(errors_mm: &[Vector3<f64>], moved_mm: &[Vector3<f64>], there: &[bool]) -> Vec<bool> {
+    let is_nearer = |row: usize| {
+        let free: Vector3<f64> = errors_mm[row] + if there[row] { moved_mm[row] } else { Vector3::zeros() };
+        (free - moved_mm[row]).norm() < free.norm()
+    };
+    (0..there.len()).map(is_nearer).collect()
 }
 
 /// Rows whose errors have the larger amounts of how a load in all of them would move the target: of two means of the amounts the larger one's.
@@ -108,11 +194,7 @@ fn settled(points: &Points, weights: &[f64], mut loaded: Vec<bool>, most_mm: f64
         if round > 1 && left.scatter_mm() > most_mm {
             return None;
         }
-        let nearer = |&row: &usize| {
-            let free: Vector3<f64> = left.errors_mm[row] + if loaded[row] { moved_mm[row] } else { Vector3::zeros() };
-            (free - moved_mm[row]).norm() < free.norm()
-        };
-        let next: Vec<bool> = rows.iter().map(nearer).collect();
+        let next = nearer(&left.errors_mm, &moved_mm, &loaded);
         if next == loaded {
             return Some(States { loaded, left, moved_mm });
         }

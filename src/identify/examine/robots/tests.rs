@@ -218,6 +218,24 @@ fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
     }
 }
 
+/// One target that the last joint turns moves as on a tool that was turned; a tool that went along the axis is no joint's.
+#[test]
+fn the_last_joint_is_named_beside_the_tool_where_one_target_does_not_tell_them_apart() {
+    for seed in 0..3 {
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
+        let half = set.poses.len() / 2;
+        set.poses[half..].iter_mut().for_each(|pose| pose.joints_rad[5] -= 0.1);
+        let told = tools::find(&set, &robot).expect("a tool").finding.finding;
+        assert!(told.contains("the tool moved on the flange by"), "{seed}: {told}");
+        let named = told.split("or the zero of joint 6 moved by ").nth(1).unwrap_or_else(|| panic!("{seed}: {told}"));
+        let by_deg: f64 = named.split(' ').next().unwrap().parse().unwrap();
+        assert!((by_deg.abs() - 0.1_f64.to_degrees()).abs() < 0.5, "{seed}: {told}");
+        let (set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 20.0, seed + 50)], false);
+        let told = tools::find(&set, &robot).expect("a tool").finding.finding;
+        assert!(!told.contains("the zero of joint"), "{seed}: {told}");
+    }
+}
+
 #[test]
 fn rows_that_were_misread_are_no_other_tool_and_no_other_robot() {
     for (seed, by_mm) in [(0, 10.0), (2, 1e3), (4, 1e7)] {

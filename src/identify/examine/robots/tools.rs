@@ -39,8 +39,8 @@ impl Tools {
 }
 
 /// Steps of a joint's zero by which its best value is found.
-const STEP_RAD: f64 = 1e-3;
-const STEP_MM: f64 = 0.5;
+pub(super) const STEP_RAD: f64 = 1e-3;
+pub(super) const STEP_MM: f64 = 0.5;
 
 /// A tool that moved.
 #[derive(Debug, Clone, PartialEq)]
@@ -72,8 +72,10 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
         }
         false => {
             let first = &set.poses[rows(&tools.parts[1])[0]].name;
-            let sensor = if tools.is_placed() { ", or the sensor moved," } else { "" };
-            format!("the tool moved on the flange by {}{sensor} from row {first} on", moved(&tools.off_mm[0]))
+            let sensor = tools.is_placed().then(|| "the sensor moved".to_owned());
+            let others: Vec<String> = table.zero_as_likely(&tools).into_iter().chain(sensor).collect();
+            let others = if others.is_empty() { String::new() } else { format!(", or {},", others.join(", or ")) };
+            format!("the tool moved on the flange by {}{others} from row {first} on", moved(&tools.off_mm[0]))
         }
     };
     let finding = Finding::new(
@@ -142,25 +144,11 @@ impl Table {
     /// turned.
     fn causes(&self, parts: &[Vec<usize>]) -> Option<Vec<Cause>> {
         let tools = self.with_tools(parts)?;
-        let numbers = TARGET as f64 * self.rows.len() as f64;
-        let changes = parts.len() as f64 - 1.0;
-        // The three coordinates of a row share what the model lacks, and count as one number; what is free costs as Schwarz has it.
-        let cause = |what: String, left: &Left, free: f64| Cause {
-            what,
-            is_sensor: false,
-            left_mm: left.scatter_mm(),
-            likelihood: -(numbers * left.squares.max(f64::MIN_POSITIVE).ln() + changes * free * numbers.ln()) / 6.0,
-        };
         let most_mm = tools.off_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let cause = |what: String, left: &Left, free: f64| self.cause(parts, what, left, free);
         let sensor = cause("the sensor or the robot's base moved".to_owned(), &tools.placed, PLACEMENT as f64);
         let tool = cause(format!("the tool moved on the flange by {most_mm:.2} mm"), &tools.apart, TARGET as f64);
-        let zeros = (1..self.points.robot.joints.len()).filter(|_| parts.len() == 2);
-        let zeros = zeros.filter_map(|joint| Some((joint, self.with_zero(joint, parts, &tools)?)));
-        let zero = zeros.min_by(|a, b| a.1.0.squares.total_cmp(&b.1.0.squares)).map(|(joint, (left, off))| {
-            let slides = self.points.robot.joints[joint].slides;
-            let by = if slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) };
-            cause(format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0)
-        });
+        let zero = self.zero(parts, &tools);
         let load = (parts.len() == 2).then(|| {
             let loaded = (0..self.rows.len()).map(|row| parts[1].contains(&row)).collect();
             let (left, moved_mm) = self.points.with_load(loaded).under_load(&parts.concat(), &tools.weights);
@@ -169,6 +157,32 @@ impl Table {
             cause(format!("a load was put on or taken off, which moves the target by up to {by:.2} mm"), &left, free)
         });
         Some([Cause { is_sensor: true, ..sensor }, tool].into_iter().chain(zero).chain(load).collect())
+    }
+
+    fn cause(&self, parts: &[Vec<usize>], what: String, left: &Left, free: f64) -> Cause {
+        let numbers = TARGET as f64 * self.rows.len() as f64;
+        let changes = parts.len() as f64 - 1.0;
+        // The three coordinates of a row share what the model lacks, and count as one number; what is free costs as Schwarz has it.
+        let squares = left.squares.max(f64::MIN_POSITIVE).ln();
+        let likelihood = -(numbers * squares + changes * free * numbers.ln()) / 6.0;
+        Cause { what, is_sensor: false, left_mm: left.scatter_mm(), likelihood }
+    }
+
+    /// Between two parts the zero of the joint that explains most.
+    fn zero(&self, parts: &[Vec<usize>], tools: &Tools) -> Option<Cause> {
+        let joints = (1..self.points.robot.joints.len()).filter(|_| parts.len() == 2);
+        let zeros = joints.filter_map(|joint| Some((joint, self.with_zero(joint, parts, tools)?)));
+        let (joint, (left, off)) = zeros.min_by(|a, b| a.1.0.squares.total_cmp(&b.1.0.squares))?;
+        let slides = self.points.robot.joints[joint].slides;
+        let by = if slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) };
+        Some(self.cause(parts, format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0))
+    }
+
+    /// The zero of a joint that explains two parts as well as tools of their own: one target moves alike where the last joint stands elsewhere.
+    fn zero_as_likely(&self, tools: &Tools) -> Option<String> {
+        let tool = self.cause(&tools.parts, String::new(), &tools.apart, TARGET as f64);
+        let zero = self.zero(&tools.parts, tools)?;
+        (tool.likelihood - zero.likelihood < TOLD_APART).then_some(zero.what)
     }
 
     /// What one robot leaves where a joint stands elsewhere in the second part, by as much as leaves least: squares of errors are a parabola of that.

@@ -98,6 +98,26 @@ fn a_joint_that_creeps_is_told_from_a_sensor_that_drifts() {
     }
 }
 
+/// The same joint at once: the row and the size are said, and not that it creeps.
+#[test]
+fn a_joint_that_steps_is_told_from_one_that_creeps() {
+    for (joint, deg) in [(4, 0.3), (4, 0.6), (5, 1.5)] {
+        let mut world = synthetic::planned(240, 0, 25.0, 0.02, 2, &|_| {});
+        world.rows.retain(|row| row.at.group == "g1" && row.at.role == Role::Sample);
+        for row in world.rows.iter_mut().skip(30) {
+            row.at.joints_deg[joint] -= deg;
+        }
+        let (_, along) = find(&Dataset::new(&world.rows).unwrap(), &world.nominal, &Settings::default());
+        // A sensor that moves may explain a large step as well; its rows are cut.
+        let Some(said) = along.instead.map(|finding| finding.finding) else {
+            assert!(!along.sessions.is_empty(), "joint {} by {deg} deg", joint + 1);
+            continue;
+        };
+        assert!(said.contains(&format!("the zero of joint {} steps by", joint + 1)), "{deg}: {said}");
+        assert!(!said.contains("creeps"), "{deg}: {said}");
+    }
+}
+
 #[test]
 fn a_socket_that_moved_is_found_where_it_moved() {
     for moved_mm in [0.3, 1.0, 5.0] {

@@ -67,6 +67,32 @@ fn one_state_makes_no_loads_whatever_bends_the_robot_or_its_model_lacks() {
     }
 }
 
+/// A gear with play stands on one side or the other, as its joint came there; it is no load, and a load is no play.
+#[test]
+fn a_joint_that_stands_elsewhere_in_some_rows_is_named_and_no_load() {
+    for (seed, joint, deg) in [(1, 1, 0.1), (2, 1, 0.3), (3, 2, 0.2), (4, 4, 0.5)] {
+        let (mut set, robot) = table(&[false; 80], 0.0, 0.0, seed);
+        let there: Vec<bool> = (0..80).map(|i| (i * i + i / 3) % 5 < 2).collect();
+        let moved = set.poses.iter_mut().zip(&there).filter(|(_, there)| **there);
+        moved.for_each(|(pose, _)| pose.joints_rad[joint] -= f64::to_radians(deg));
+        let Table { rows, points } = Table::new(&set, &robot).unwrap();
+        let (all, weights): (Vec<usize>, Vec<f64>) = rows.iter().enumerate().map(|(i, _)| (i, 1.0)).unzip();
+        let never = points.together(&[all], &weights);
+        let of_joints = (0..6).filter_map(|joint| Some((joint, elsewhere(&points, joint, &weights, &never)?)));
+        let (named, cause) = of_joints.min_by(|a, b| a.1.left.squares.total_cmp(&b.1.left.squares)).unwrap();
+        assert_eq!(named, joint, "{seed}: {}", cause.what);
+        let by: f64 = cause.what.split(" by ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        assert!((by / deg - 1.0).abs() < 0.1, "{seed}: {}", cause.what);
+        let of_rows: Vec<usize> = smaller(&cause.there).into_iter().map(|i| rows[i]).collect();
+        let wrong = (0..80).filter(|row| of_rows.contains(row) != there[*row]).count();
+        assert!(wrong < 8 && cause.left.scatter_mm() < 1.5 * NOISE_MM, "{seed}: {wrong}, {}", cause.what);
+    }
+    let loaded: Vec<bool> = (0..60).map(|i| i % 2 == 0).collect();
+    let (set, robot) = table(&loaded, 3e-3, 0.0, 2);
+    let said = find(&set, &robot).expect("a load").finding;
+    assert!(said.contains("a load that moves") && !said.contains("stands elsewhere"), "{said}");
+}
+
 #[test]
 fn a_load_from_some_row_on_is_named_where_it_makes_sessions() {
     let mut named = 0;
