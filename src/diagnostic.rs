@@ -92,6 +92,11 @@ pub fn two_digits(value: f64) -> String {
     fixed(value, decimals_of(value))
 }
 
+/// A number as a person would write it, with seven significant digits at the most: `29.61111`, `25`.
+pub fn short(value: f64) -> String {
+    format!("{value:.6e}").parse().unwrap_or(value).to_string()
+}
+
 /// Values of one kind below each other with the same decimals: two digits of those that are a tenth as large as the largest.
 pub fn aligned(values: &[Option<f64>]) -> Vec<String> {
     let largest = values.iter().flatten().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -207,6 +212,14 @@ mod tests {
         ] {
             assert_eq!(two_digits(value), text);
         }
+    }
+
+    #[test]
+    fn short_numbers_have_few_digits() {
+        assert_eq!(
+            [29.611_111_111, 149.999_999_999, 25.0, 0.001, 10.000_12].map(short),
+            ["29.61111", "150", "25", "0.001", "10.00012"]
+        );
     }
 
     #[test]

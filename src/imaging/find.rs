@@ -91,7 +91,18 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
     let [left_size, right_size] = sizes;
+    notes.extend(sizes_differ(sizes));
     Ok(Corners { board: wanted.board, left_size, right_size, pairs, skipped, blind, open, notes })
+}
+
+/// That the two cameras' pictures are not of one size.
+fn sizes_differ([left, right]: [(u32, u32); 2]) -> Option<String> {
+    (left != right && left.0 > 0 && right.0 > 0).then(|| {
+        format!(
+            "the left pictures are {}x{} px, the right ones {}x{} px: of two cameras of one kind those of one side were resized or cut",
+            left.0, left.1, right.0, right.1
+        )
+    })
 }
 
 /// That files hold pictures beside the first, which are not read.
@@ -169,13 +180,18 @@ impl Folder<'_> {
     }
 }
 
-/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none.
-pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, String> {
+/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none, and the board that
+/// both pictures show instead.
+pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, Refusal> {
     let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
-    let looks = rayon::join(|| alone(&files.left), || alone(&files.right));
-    let Sorted { found, skipped, .. } = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]], wanted.board);
-    let reason = || skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
-    number_alike(found, wanted.board).into_iter().next().ok_or_else(reason)
+    let looks = <[Look; 2]>::from(rayon::join(|| alone(&files.left), || alone(&files.right)));
+    let seen = other_board(std::slice::from_ref(&looks));
+    let Sorted { found, skipped, .. } = sort_out(std::slice::from_ref(files), vec![looks], wanted.board);
+    let refusal = || {
+        let reason = skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
+        Refusal { reason, seen }
+    };
+    number_alike(found, wanted.board).into_iter().next().ok_or_else(refusal)
 }
 
 /// What is in a picture file, from the cache where it was looked at before.
@@ -329,6 +345,15 @@ fn majority_sizes(headers: &[[Announced; 2]]) -> [(u32, u32); 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_two_sizes_are_said() {
+        let said = sizes_differ([(640, 480), (1280, 960)]).unwrap();
+        assert!(said.starts_with("the left pictures are 640x480 px, the right ones 1280x960 px"), "{said}");
+        for sizes in [[(640, 480); 2], [(640, 480), (0, 0)]] {
+            assert_eq!(sizes_differ(sizes), None);
+        }
+    }
 
     #[test]
     fn the_first_pairs_are_spread_over_all_and_none_is_left_out_or_twice() {

@@ -8,6 +8,9 @@ use crate::stereo::Lens;
 /// How the reason begins where both sides of a pair hold one picture.
 pub const ONE_PICTURE: &str = "left and right picture are one picture";
 
+/// How the reason ends of pairs that `--since` leaves out.
+pub const BY_SINCE: &str = "which --since names";
+
 /// What was done to all pictures of one side; which side it was the pictures do not tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OneSide {
@@ -275,6 +278,9 @@ impl Explain for Error {
             match self {
                 Error::TooFewPairs { skipped, .. } if skipped.iter().any(|s| s.reason.starts_with(ONE_PICTURE)) => {
                     "name the folders of both cameras, each with its own pictures: `stereocal camera-check LEFT RIGHT`"
+                }
+                Error::TooFewPairs { skipped, .. } if skipped.iter().any(|s| s.reason.ends_with(BY_SINCE)) => {
+                    "`--since` an earlier pair, or photograph more pairs of the rig as it is since then"
                 }
                 Error::TooFewPairs { .. } => {
                     "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
