@@ -62,16 +62,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
         })
         .collect::<Result<_, files::Error>>()?;
     bar.finish_and_clear();
-    let mut kept = Vec::new();
-    for ((files, names), outcome) in pairing.pairs.iter().zip(names).zip(done) {
-        match outcome {
-            Ok(()) => kept.push((files.pair.clone(), names)),
-            Err(reason) => {
-                progress::warn(format!("pair {} is not rectified: {reason}", files.pair));
-                file.pairs_skipped.push(Skipped { pair: files.pair.clone(), reason });
-            }
-        }
-    }
+    let kept = kept(pairing.pairs.iter().zip(names).zip(done), &mut file.pairs_skipped);
     if kept.is_empty() {
         return Err(imaging::Error::NoneReadable { path: pairing.place, skipped: file.pairs_skipped }.into());
     }
@@ -90,6 +81,24 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
     Ok(Outcome { stdout, status: status.or_worse(at_best) })
+}
+
+/// The pairs that were written; the others go to those that were skipped, with a word.
+fn kept<'a>(
+    pairs: impl Iterator<Item = ((&'a PairFiles, [String; 2]), std::result::Result<(), String>)>,
+    skipped: &mut Vec<Skipped>,
+) -> Vec<(String, [String; 2])> {
+    let mut kept = Vec::new();
+    for ((files, names), outcome) in pairs {
+        match outcome {
+            Ok(()) => kept.push((files.pair.clone(), names)),
+            Err(reason) => {
+                progress::warn(format!("pair {} is not rectified: {reason}", files.pair));
+                skipped.push(Skipped { pair: files.pair.clone(), reason });
+            }
+        }
+    }
+    kept
 }
 
 /// The pairs as they were written.
