@@ -9,8 +9,9 @@ use camino::Utf8Path;
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
-use super::board::Layout;
+use super::board::{Kind, Layout};
 use super::coded;
+use super::detect::count::{Seen, squares_of};
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::pyramid::Small;
 use super::image::{self, Claim, Header, Mosaic, Picture};
@@ -20,7 +21,7 @@ use super::lattice::Lattice;
 use super::refine::fields;
 use super::shown::{printed, unseen_lines};
 use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
-use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, overlay, refine};
+use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, overlay, refine};
 use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
@@ -228,7 +229,7 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Optio
         Err(reason) => return (Err(reason.into()), None),
     };
     drop(bytes);
-    match detect::detect(&picture, wanted.board) {
+    match detected(&picture, wanted.board) {
         Ok(detected) => {
             let is_kept = wanted.cache.is_some_and(|cache| cache.thumbnails);
             let thumbnail = is_kept.then(|| thumbnail_of(&picture, Some(&detected)));
@@ -255,7 +256,23 @@ pub fn corners_in(picture: &Picture, board: Board) -> Result<Lattice<Corner>, Re
 
 /// The board's corners in a picture, whose numbers may be open; the reason where there are none.
 pub fn seen_in(picture: &Picture, board: Board) -> Look {
-    corners_of(picture, &detect::detect(picture, board)?, board)
+    corners_of(picture, &detected(picture, board)?, board)
+}
+
+/// The board in a picture; where markers were looked for and none was read, the plain board that it shows, if it shows a whole one.
+fn detected(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let counted = |refusal: Refusal| {
+        let is_unread = board.is_coded() && refusal.seen.is_none() && refusal.reason.ends_with(coded::UNREAD);
+        let Some(Seen { squares, ends: true }) = is_unread.then(|| squares_of(picture)).flatten() else {
+            return refusal;
+        };
+        let reason = format!("shows a board of {squares} squares, and no marker in it that can be read");
+        // Of as many squares as the board has it may be the board, in a poor picture.
+        let counts = |squares: Squares| [squares.columns.min(squares.rows), squares.columns.max(squares.rows)];
+        let is_other = counts(squares) != counts(board.squares);
+        Refusal { reason, seen: is_other.then_some(Board { squares, kind: Kind::Checker, ..board }) }
+    };
+    detect::detect(picture, board).map_err(counted)
 }
 
 /// The corners of a board that was found.

@@ -102,7 +102,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         let other = || of_other_kind(picture, &board).map(Refusal::from);
         return Err(explain::unnumbered(picture, &board, grids)
             .or_else(other)
-            .unwrap_or_else(|| explain::unread(picture, &board, grids)));
+            .unwrap_or_else(|| explain::unread(grids)));
     };
     let Part { placement, fields, .. } = parts[0];
     let merged = merged(&board, &parts);

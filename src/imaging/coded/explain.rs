@@ -10,7 +10,6 @@ use super::numbering::{self, Placement, Read, Said};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind, Layout, Pitch, Squares};
 use crate::imaging::detect::Refusal;
-use crate::imaging::detect::count::{Seen, squares_of};
 use crate::imaging::image::Picture;
 use crate::imaging::lattice::Places;
 
@@ -59,17 +58,12 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Option<
     other_markers(picture, board, (dictionary, own), grid)
 }
 
-/// What is said of a picture in whose grids nothing was read: the plain board that it shows, where it shows a whole one.
-pub fn unread(picture: &Picture, board: &Board, grids: &[Places]) -> Refusal {
-    if let Some(Seen { squares, ends: true }) = squares_of(picture) {
-        let reason = format!("shows a board of {squares} squares, and no marker in it that can be read");
-        // Of as many squares as the board has it may be the board, in a poor picture.
-        let counts = |squares: Squares| [squares.columns.min(squares.rows), squares.columns.max(squares.rows)];
-        let is_other = counts(squares) != counts(board.squares);
-        return Refusal { reason, seen: is_other.then_some(Board { squares, kind: Kind::Checker, ..*board }) };
-    }
-    let corners =
-        |grid: &Places| format!("shows {} corners of squares, and no marker among them that can be read", grid.count());
+/// How the reason ends where a grid of corners holds no marker.
+pub const UNREAD: &str = "and no marker among them that can be read";
+
+/// What is said of grids in which nothing was read.
+pub fn unread(grids: &[Places]) -> Refusal {
+    let corners = |grid: &Places| format!("shows {} corners of squares, {UNREAD}", grid.count());
     largest(grids).map_or_else(|| "no board found".to_owned(), corners).into()
 }
 

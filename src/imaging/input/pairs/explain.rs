@@ -226,8 +226,8 @@ fn empty_side(folders: &[Folder]) -> Option<(&Utf8PathBuf, Side)> {
     let side = |path: &Utf8PathBuf| Open::new(path.file_name()?, Reach::Words).side();
     let holds = |path: &Utf8PathBuf| folders.iter().any(|f| !f.pictures.is_empty() && f.path.starts_with(path));
     let is_full = |wanted: Side| top.folders.iter().any(|path| side(path) == Some(wanted) && holds(path));
-    let empty = top.folders.iter().filter(|path| !holds(path)).filter_map(|path| Some((path, side(path)?)));
-    empty.into_iter().find(|(_, side)| is_full(side.other()))
+    let mut empty = top.folders.iter().filter(|path| !holds(path)).filter_map(|path| Some((path, side(path)?)));
+    empty.find(|(_, side)| is_full(side.other()))
 }
 
 /// The folders below the one that was named, those with a word for left first and for right last.
