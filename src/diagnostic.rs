@@ -92,6 +92,11 @@ pub fn two_digits(value: f64) -> String {
     fixed(value, decimals_of(value))
 }
 
+/// A number as a person would write it, with seven significant digits at the most: `29.61111`, `25`.
+pub fn short(value: f64) -> String {
+    format!("{value:.6e}").parse().unwrap_or(value).to_string()
+}
+
 /// Values of one kind below each other with the same decimals: two digits of those that are a tenth as large as the largest.
 pub fn aligned(values: &[Option<f64>]) -> Vec<String> {
     let largest = values.iter().flatten().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
@@ -99,19 +104,21 @@ pub fn aligned(values: &[Option<f64>]) -> Vec<String> {
     values.iter().map(|value| fixed(value.unwrap_or(f64::NAN), decimals)).collect()
 }
 
-/// What something is at most, rounded up to two digits, and to more where these would put it beyond a limit that it is within.
+/// What something is at most, rounded up to three digits, and to more where these would put it beyond a limit that it is within. Two digits would say
+/// up to a tenth more than is known, beside a sum that says less.
 pub fn at_most(value: f64, limit: f64) -> String {
-    let up = |decimals: usize| {
-        let steps = 10f64.powi(decimals as i32);
-        // What is a number of these digits but for the last bits of a double stays that.
-        (value * steps - 1e-6).ceil() / steps
-    };
-    let all = decimals_of(value)..FINEST;
-    let decimals = all.into_iter().find(|&d| value > limit || up(d) <= limit).unwrap_or(FINEST);
-    fixed(up(decimals), decimals)
+    let all = (decimals_of(value) + 1).min(FINEST)..FINEST;
+    let decimals = all.into_iter().find(|&d| value > limit || rounded_up(value, d) <= limit).unwrap_or(FINEST);
+    fixed(rounded_up(value, decimals), decimals)
 }
 
-/// Two lengths and their sum, with the same decimals and so that what is written adds up: `[a, b, a + b]`.
+/// Rounded up to so many decimals; what is a number of these but for the last bits of a double stays that.
+fn rounded_up(value: f64, decimals: usize) -> f64 {
+    let steps = 10f64.powi(decimals as i32);
+    (value * steps - 1e-6).ceil() / steps
+}
+
+/// Two lengths and their sum, which is rounded up, with the same decimals and so that what is written adds up: `[a, b, a + b]`.
 pub fn summed(a: f64, b: f64) -> [String; 3] {
     let sum = a + b;
     if !sum.is_finite() {
@@ -120,8 +127,9 @@ pub fn summed(a: f64, b: f64) -> [String; 3] {
     let (less, more) = (a.abs().min(b.abs()), a.abs().max(b.abs()));
     let decimals = if less > 0.0 { decimals_of(less) } else { 0 }.max(decimals_of(more) + 1).min(FINEST);
     let rounded = |v: f64| format!("{v:.decimals$}").parse::<f64>().unwrap_or(v);
+    let sum = rounded_up(sum, decimals);
     // The last digit of the second gives way.
-    [a, rounded(sum) - rounded(a), sum].map(|v| format!("{v:.decimals$}"))
+    [a, sum - rounded(a), sum].map(|v| format!("{v:.decimals$}"))
 }
 
 /// Most decimals of a length in mm.
@@ -210,6 +218,14 @@ mod tests {
     }
 
     #[test]
+    fn short_numbers_have_few_digits() {
+        assert_eq!(
+            [29.611_111_111, 149.999_999_999, 25.0, 0.001, 10.000_12].map(short),
+            ["29.61111", "150", "25", "0.001", "10.00012"]
+        );
+    }
+
+    #[test]
     fn a_column_has_the_decimals_of_its_largest_value() {
         let column = aligned(&[Some(1.5673), Some(-0.2104), None, Some(0.001)]);
         assert_eq!(column, ["1.57", "-0.21", "n/a", "0"]);
@@ -219,13 +235,13 @@ mod tests {
     #[test]
     fn a_bound_is_rounded_up_and_not_beyond_its_limit() {
         for (value, limit, text) in [
-            (2.1383, 2.5, "2.2"),
-            (2.1383, 2.17, "2.14"),
-            (0.0061, 0.05, "0.0061"),
-            (0.006_01, 0.05, "0.0061"),
-            (0.049_96, 0.05, "0.050"),
-            (3.21, 0.05, "3.3"),
-            (0.3, 0.3, "0.30"),
+            (2.1383, 2.5, "2.14"),
+            (2.1383, 2.1385, "2.1383"),
+            (0.0061, 0.05, "0.00610"),
+            (0.006_001, 0.05, "0.00601"),
+            (0.049_96, 0.05, "0.0500"),
+            (3.8018, 2.12, "3.81"),
+            (0.3, 0.3, "0.300"),
         ] {
             assert_eq!(at_most(value, limit), text);
         }
@@ -235,6 +251,7 @@ mod tests {
     #[test]
     fn what_is_written_of_a_sum_adds_up() {
         assert_eq!(summed(1.0408, 1.2469), ["1.04", "1.25", "2.29"]);
+        assert_eq!(summed(3.152, 0.6498), ["3.15", "0.66", "3.81"]);
         assert_eq!(summed(0.005_565, 0.000_494), ["0.00556", "0.00050", "0.00606"]);
         // 0.0144 and 0.0144 are 0.0288.
         assert_eq!(summed(0.0144, 0.0144), ["0.0144", "0.0144", "0.0288"]);

@@ -7,6 +7,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;
 
+use super::fault::{decimal_comma, plain};
 use super::kind::kind;
 use crate::diagnostic::{Explain, Place};
 
@@ -196,55 +197,11 @@ pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
         let key = e.span().and_then(|span| text.get(span)).filter(|key| !key.is_empty() && key.len() < 40);
         let key = key.filter(|key| !e.message().contains(['`', '"']) && !key.contains('\n'));
         let key = key.map_or(String::new(), |key| format!(": `{key}`"));
+        if let Some(fault) = line.and_then(|line| decimal_comma(text.lines().nth(line as usize - 1)?)) {
+            return Error::format(path, line, format!("{what}: {fault}"), None);
+        }
         Error::format(path, line, format!("{what}: {}{key}", plain(e.message())), None)
     })
-}
-
-/// A message of the readers of JSON and TOML in the words of the file's format, as their own name types of the source; without the place, which is said
-/// apart.
-fn plain(message: &str) -> String {
-    let message = message.split(" at line ").next().unwrap_or(message);
-    let prefixed = |prefix: &str| message.strip_prefix(prefix);
-    if let Some(key) = prefixed("missing field ") {
-        return format!("{key} is missing");
-    }
-    if let Some((key, known)) = prefixed("unknown field ").and_then(|rest| rest.split_once(", expected ")) {
-        return format!("unknown key {key}; there are {}", known.trim_start_matches("one of "));
-    }
-    if let Some(key) = prefixed("duplicate field ") {
-        return format!("{key} stands there twice");
-    }
-    let of_type = prefixed("invalid type: ").or(prefixed("invalid value: "));
-    if let Some((found, needed)) = of_type.and_then(|rest| rest.split_once(", expected ")) {
-        return format!("{} stands where {} is needed", found_in_words(found), needed_in_words(needed));
-    }
-    if let Some((found, needed)) = prefixed("invalid length ").and_then(|rest| rest.split_once(", expected ")) {
-        return format!("{found} values stand where {} is needed", needed_in_words(needed));
-    }
-    message.to_owned()
-}
-
-fn found_in_words(found: &str) -> String {
-    match found {
-        "sequence" => "a list".to_owned(),
-        "map" => "a table of keys".to_owned(),
-        "null" => "`null`".to_owned(),
-        other => ["integer", "floating point", "boolean"].iter().fold(other.to_owned(), |said, kind| {
-            said.strip_prefix(&format!("{kind} ")).map_or(said.clone(), str::to_owned)
-        }),
-    }
-}
-
-fn needed_in_words(needed: &str) -> String {
-    match needed {
-        "f64" | "f32" => "a number".to_owned(),
-        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number".to_owned(),
-        "a string" | "string" => "text in quotes".to_owned(),
-        "a boolean" => "true or false".to_owned(),
-        "a sequence" => "a list".to_owned(),
-        other if other.starts_with("struct ") || other == "a map" => "a table of keys".to_owned(),
-        other => other.strip_prefix("an array of length ").map_or(other.to_owned(), |n| format!("a list of {n}")),
-    }
 }
 
 /// Indented JSON with a final newline. Numbers that are not finite become `null`.
@@ -362,28 +319,5 @@ mod tests {
             |action| Error::Io { action, path: "x".into(), source: std::io::ErrorKind::PermissionDenied.into() };
         assert!(refused("read").hint().is_some_and(|hint| hint.contains("chmod -R u+rX x")));
         assert!(refused("write").hint().is_some_and(|hint| hint.contains("--out DIR")));
-    }
-
-    #[test]
-    fn readers_are_quoted_without_the_types_of_the_source() {
-        for (message, said) in [
-            ("missing field `fx` at line 18 column 3", "`fx` is missing"),
-            ("unknown field `b_mm`, expected one of `a_mm`, `d_mm`", "unknown key `b_mm`; there are `a_mm`, `d_mm`"),
-            ("duplicate field `name`", "`name` stands there twice"),
-            (
-                "invalid type: string \"a\", expected f64 at line 6 column 13",
-                "string \"a\" stands where a number is needed",
-            ),
-            ("invalid type: integer `3`, expected a string", "`3` stands where text in quotes is needed"),
-            ("invalid type: sequence, expected f64", "a list stands where a number is needed"),
-            ("invalid length 2, expected an array of length 3", "2 values stand where a list of 3 is needed"),
-            (
-                "invalid length 0, expected struct File with 12 elements",
-                "0 values stand where a table of keys is needed",
-            ),
-            ("key with no value, expected `=`", "key with no value, expected `=`"),
-        ] {
-            assert_eq!(plain(message), said);
-        }
     }
 }

@@ -1,5 +1,6 @@
 //! Files as the program reads and writes them: whole, atomically, with the path in every complaint.
 
+mod fault;
 mod io;
 pub mod kind;
 pub mod out_dir;

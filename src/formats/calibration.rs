@@ -74,7 +74,7 @@ pub struct Check {
     verdict: Verdict,
     /// The largest error of a length that passed, mm.
     pub tolerance_mm: f64,
-    /// What lengths can be trusted to; none where the rig measures nothing, or something else than a length stands against it.
+    /// What lengths can be trusted to; none where something else than a length stands against the rig.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     trusted_mm: Option<f64>,
     /// Up to which length, mm.
@@ -107,6 +107,11 @@ impl Calibrated {
         self.check.is_some_and(|check| check.verdict == Verdict::Fail)
     }
 
+    /// What lengths can be trusted to by its own calibration, mm.
+    pub fn trusted_mm(&self) -> Option<f64> {
+        self.check?.trusted_mm.filter(|mm| mm.is_finite())
+    }
+
     /// What its own calibration says against the rig, for those who use it.
     pub fn doubts(&self) -> Vec<String> {
         let changed = self.unconfirmed.first().map(|last| {
@@ -115,8 +120,8 @@ impl Calibrated {
         let failed = self.check.filter(|check| check.verdict != Verdict::Pass).map(|check| {
             let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
             let up_to = check.length_mm.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
-            let trusted = check.trusted_mm.filter(|mm| mm.is_finite()).map_or_else(
-                || "no length can be trusted".to_owned(),
+            let trusted = self.trusted_mm().map_or_else(
+                || "to what its lengths can be trusted is not known".to_owned(),
                 |mm| format!("lengths{up_to} can be trusted to {} mm", at_most(mm, f64::INFINITY)),
             );
             format!(
@@ -229,8 +234,12 @@ impl CalibrationFile {
         let facts = &judged.facts;
         let [nearest_mm, farthest_mm] = facts.coverage.corner_depths_mm;
         let (verdict, tolerance_mm) = (judged.verdict, facts.tolerance_mm);
-        let trusted_mm = judged.trusted_mm().filter(|_| !judged.measures_nothing());
-        self.check = Some(Check { verdict, tolerance_mm, trusted_mm, length_mm: Some(facts.volume.length_mm) });
+        self.check = Some(Check {
+            verdict,
+            tolerance_mm,
+            trusted_mm: judged.trusted_mm(),
+            length_mm: Some(facts.volume.length_mm),
+        });
         self.volume = Some(facts.volume.volume.clone());
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::imaging::{Board, Skipped};
 use crate::linear_algebra::rows;
-use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling};
+use crate::stereo::model::rectification::{Matrices, RowResidual, Scaling, SizeResidual};
 use crate::stereo::{Rig, Side};
 
 /// The content of `rectified.json`. Matrices row by row, px and mm.
@@ -30,6 +30,11 @@ pub struct RectifiedFile {
     /// How far the rows differ over all corners of the board that was found; null without a board.
     pub residual: Option<RowResidual>,
     pub board: Option<String>,
+    /// How large the board comes out, where it is the one that calibrated.
+    pub size: Option<SizeResidual>,
+    /// The boards that were looked for.
+    #[serde(skip)]
+    pub looked_for: String,
     pub pairs: Vec<RectifiedPair>,
     /// The pairs not written, and why.
     pub pairs_skipped: Vec<Skipped>,

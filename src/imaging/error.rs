@@ -198,6 +198,11 @@ fn of_too_few([found, total, needed]: [usize; 3], board: &Board, skipped: &[Skip
         Some(other) if other.is_coded() => {
             format!("`--board {other}`: the pictures show markers as that board has them")
         }
+        Some(other) if board.is_coded() => format!(
+            "`--squares {}` with its `--square-mm` if it is a plain board: no marker can be read; else {}",
+            other.squares,
+            as_printed(board)
+        ),
         Some(other) => {
             let (squares, columns, rows) = (other.squares, other.columns(), other.rows());
             format!("`--squares {squares}`: the pictures show a board with {columns}x{rows} inner corners")
@@ -308,6 +313,12 @@ mod tests {
         }
         // As names of boards are read.
         assert!("charuco:5x4:30:22:DICT_APRILTAG_36h11".parse::<Board>().is_ok());
+    }
+
+    #[test]
+    fn a_plain_board_that_is_seen_instead_is_counted() {
+        let said = hint_for("apriltag:6x6:tag36h11:25:7.5", &["shows a board"], Some("checker:10x7:25"));
+        assert!(said.starts_with("`--squares 10x7` with its `--square-mm`") && said.contains("as printed"), "{said}");
     }
 
     #[test]

@@ -9,8 +9,9 @@ use camino::Utf8Path;
 use nalgebra::Matrix2;
 use rayon::prelude::*;
 
-use super::board::Layout;
+use super::board::{Kind, Layout};
 use super::coded;
+use super::detect::count::{Seen, squares_of};
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::pyramid::Small;
 use super::image::{self, Claim, Header, Mosaic, Picture};
@@ -20,7 +21,7 @@ use super::lattice::Lattice;
 use super::refine::fields;
 use super::shown::{printed, unseen_lines};
 use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
-use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, overlay, refine};
+use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, overlay, refine};
 use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::picture_hash;
@@ -91,7 +92,18 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
     let [left_size, right_size] = sizes;
+    notes.extend(sizes_differ(sizes));
     Ok(Corners { board: wanted.board, left_size, right_size, pairs, skipped, blind, open, notes })
+}
+
+/// That the two cameras' pictures are not of one size.
+fn sizes_differ([left, right]: [(u32, u32); 2]) -> Option<String> {
+    (left != right && left.0 > 0 && right.0 > 0).then(|| {
+        format!(
+            "the left pictures are {}x{} px, the right ones {}x{} px: of two cameras of one kind those of one side were resized or cut",
+            left.0, left.1, right.0, right.1
+        )
+    })
 }
 
 /// That files hold pictures beside the first, which are not read.
@@ -169,13 +181,18 @@ impl Folder<'_> {
     }
 }
 
-/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none.
-pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, String> {
+/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none, and the board that
+/// both pictures show instead.
+pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, Refusal> {
     let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
-    let looks = rayon::join(|| alone(&files.left), || alone(&files.right));
-    let Sorted { found, skipped, .. } = sort_out(std::slice::from_ref(files), vec![[looks.0, looks.1]], wanted.board);
-    let reason = || skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
-    number_alike(found, wanted.board).into_iter().next().ok_or_else(reason)
+    let looks = <[Look; 2]>::from(rayon::join(|| alone(&files.left), || alone(&files.right)));
+    let seen = other_board(std::slice::from_ref(&looks));
+    let Sorted { found, skipped, .. } = sort_out(std::slice::from_ref(files), vec![looks], wanted.board);
+    let refusal = || {
+        let reason = skipped.into_iter().next().map_or_else(|| "no board".to_owned(), |s| s.reason);
+        Refusal { reason, seen }
+    };
+    number_alike(found, wanted.board).into_iter().next().ok_or_else(refusal)
 }
 
 /// What is in a picture file, from the cache where it was looked at before.
@@ -212,7 +229,7 @@ fn look_at(bytes: Vec<u8>, path: &Utf8Path, wanted: &Wanted<'_>) -> (Look, Optio
         Err(reason) => return (Err(reason.into()), None),
     };
     drop(bytes);
-    match detect::detect(&picture, wanted.board) {
+    match detected(&picture, wanted.board) {
         Ok(detected) => {
             let is_kept = wanted.cache.is_some_and(|cache| cache.thumbnails);
             let thumbnail = is_kept.then(|| thumbnail_of(&picture, Some(&detected)));
@@ -239,7 +256,23 @@ pub fn corners_in(picture: &Picture, board: Board) -> Result<Lattice<Corner>, Re
 
 /// The board's corners in a picture, whose numbers may be open; the reason where there are none.
 pub fn seen_in(picture: &Picture, board: Board) -> Look {
-    corners_of(picture, &detect::detect(picture, board)?, board)
+    corners_of(picture, &detected(picture, board)?, board)
+}
+
+/// The board in a picture; where markers were looked for and none was read, the plain board that it shows, if it shows a whole one.
+fn detected(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
+    let counted = |refusal: Refusal| {
+        let is_unread = board.is_coded() && refusal.seen.is_none() && refusal.reason.ends_with(coded::UNREAD);
+        let Some(Seen { squares, ends: true }) = is_unread.then(|| squares_of(picture)).flatten() else {
+            return refusal;
+        };
+        let reason = format!("shows a board of {squares} squares, and no marker in it that can be read");
+        // Of as many squares as the board has it may be the board, in a poor picture.
+        let counts = |squares: Squares| [squares.columns.min(squares.rows), squares.columns.max(squares.rows)];
+        let is_other = counts(squares) != counts(board.squares);
+        Refusal { reason, seen: is_other.then_some(Board { squares, kind: Kind::Checker, ..board }) }
+    };
+    detect::detect(picture, board).map_err(counted)
 }
 
 /// The corners of a board that was found.
@@ -329,6 +362,15 @@ fn majority_sizes(headers: &[[Announced; 2]]) -> [(u32, u32); 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_two_sizes_are_said() {
+        let said = sizes_differ([(640, 480), (1280, 960)]).unwrap();
+        assert!(said.starts_with("the left pictures are 640x480 px, the right ones 1280x960 px"), "{said}");
+        for sizes in [[(640, 480); 2], [(640, 480), (0, 0)]] {
+            assert_eq!(sizes_differ(sizes), None);
+        }
+    }
 
     #[test]
     fn the_first_pairs_are_spread_over_all_and_none_is_left_out_or_twice() {

@@ -7,6 +7,7 @@ use super::drawing::figure::Plot;
 use super::drawing::picture::PairJpeg;
 use super::page::{self, Tone};
 use super::table::number;
+use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::formats::rectified::{RectifiedFile, RectifiedPair};
 use crate::imaging::input::pairs::PairFiles;
@@ -22,17 +23,38 @@ const LINES: u32 = 24;
 /// Length at which the largest difference is drawn, as a share of the picture's width.
 const LONGEST_ARROW: f64 = 0.06;
 
-/// Rows that differ by more, px RMS, are no common ones: dense stereo looks for a point along one row.
+/// Rows that differ by more, px RMS, are no common ones: dense stereo looks for a point along one row. Disparities that are off by more are as far from
+/// where it finds one.
 const AGREE_PX: f64 = 0.5;
 
+/// What the board says against the rectified pictures.
+pub fn doubts(file: &RectifiedFile) -> Vec<String> {
+    rows_differ(file).into_iter().chain(disparities_off(file)).collect()
+}
+
 /// What rows that do not agree mean.
-pub fn doubt(file: &RectifiedFile) -> Option<String> {
+fn rows_differ(file: &RectifiedFile) -> Option<String> {
     let (common, residual) = (file.common?, file.residual?);
     (residual.rms_px > AGREE_PX).then(|| {
         format!(
             "the {common} differ by {} px RMS, too much for dense stereo (up to {AGREE_PX}): the pictures are of another rig, it changed, or its \
              calibration is poor",
             number(Some(residual.rms_px), 2)
+        )
+    })
+}
+
+/// What a board of another size than it has means, where it is off by more than the rig's own calibration leaves open.
+fn disparities_off(file: &RectifiedFile) -> Option<String> {
+    let (size, board) = (file.size?, file.board.as_ref()?);
+    let is_off = size.disparity_px.abs() > AGREE_PX && size.diagonal_mm.abs() > size.trusted_mm.unwrap_or(0.0);
+    is_off.then(|| {
+        format!(
+            "the disparities are off by {} px in the middle one of {}: by them the {board} board that calibrated is {:.4} times as large as it is. The \
+             rig changed since, or this is another board of as many squares: `stereocal camera-check IMAGES --against` the calibration tells",
+            number(Some(size.disparity_px), 2),
+            count(size.pairs, "pair"),
+            size.times
         )
     })
 }
@@ -64,7 +86,10 @@ fn agreement(file: &RectifiedFile) -> Option<String> {
             r.corners,
             file.pairs.iter().filter(|p| p.residual.is_some()).count(),
         ),
-        _ => format!("no board was seen in the rectified pictures: how well their {common} agree was not measured"),
+        _ => format!(
+            "no board was seen in the rectified pictures (looked for: {} squares): how well their {common} agree was not measured",
+            file.looked_for
+        ),
     })
 }
 
@@ -85,7 +110,8 @@ pub fn page(
         @if let Some(text) = agreement(file) {
             @let (tone, headline) = match (&file.residual, doubts.is_empty()) {
                 (None, _) => (Tone::Doubtful, "Not checked"),
-                _ if doubt(file).is_some() => (Tone::Bad, "The rows do not agree"),
+                _ if rows_differ(file).is_some() => (Tone::Bad, "The rows do not agree"),
+                _ if disparities_off(file).is_some() => (Tone::Bad, "The disparities are off"),
                 (_, false) => (Tone::Doubtful, "Rectified by a doubtful rig"),
                 (_, true) => (Tone::Good, "Rectified"),
             };

@@ -8,6 +8,9 @@ use crate::stereo::Lens;
 /// How the reason begins where both sides of a pair hold one picture.
 pub const ONE_PICTURE: &str = "left and right picture are one picture";
 
+/// How the reason ends of pairs that `--since` leaves out.
+pub const BY_SINCE: &str = "which --since names";
+
 /// What was done to all pictures of one side; which side it was the pictures do not tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OneSide {
@@ -273,12 +276,7 @@ impl Explain for Error {
     fn hint(&self) -> Option<String> {
         Some(
             match self {
-                Error::TooFewPairs { skipped, .. } if skipped.iter().any(|s| s.reason.starts_with(ONE_PICTURE)) => {
-                    "name the folders of both cameras, each with its own pictures: `stereocal camera-check LEFT RIGHT`"
-                }
-                Error::TooFewPairs { .. } => {
-                    "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
-                }
+                Error::TooFewPairs { skipped, .. } => of_too_few(skipped),
                 Error::NothingInCommon { .. } => {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
@@ -330,4 +328,15 @@ impl Explain for Error {
             .to_owned(),
         )
     }
+}
+
+/// What to do where too few pairs can be used, by why the others cannot.
+fn of_too_few(skipped: &[Skipped]) -> &'static str {
+    if skipped.iter().any(|skipped| skipped.reason.starts_with(ONE_PICTURE)) {
+        return "name the folders of both cameras, each with its own pictures: `stereocal camera-check LEFT RIGHT`";
+    }
+    if skipped.iter().any(|skipped| skipped.reason.ends_with(BY_SINCE)) {
+        return "`--since` an earlier pair, or photograph more pairs of the rig as it is since then";
+    }
+    "photograph more pairs; `--squares CxR` must be the board's squares, not its inner corners"
 }

@@ -55,7 +55,7 @@ fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
     let page = |out: &str| std::fs::read_to_string(world.join(out).join("measure.html")).unwrap();
     assert!(page("out").contains("<div class=\"verdict good\">"));
 
-    // A rig that did not pass, and one of which no length can be trusted.
+    // A rig that did not pass, and one of which it is not known to what its lengths can be trusted.
     for trusted_mm in [serde_json::json!(0.2), Value::Null] {
         let mut rig = json(&world.join("out/calibration.json"));
         rig["check"] = serde_json::json!({"verdict": "fail", "tolerance_mm": 0.05, "trusted_mm": trusted_mm});

@@ -45,7 +45,7 @@ fn a_rig_that_failed_is_planned_with_in_so_many_words() {
             serde_json::json!({"verdict": verdict, "tolerance_mm": 0.05, "trusted_mm": 0.2, "length_mm": 70.0});
         std::fs::write(at.join("out/calibration.json"), rig.to_string()).unwrap();
         let said = run(at, &[&["--poses", "8", "--verify", "2", "--force"], &QUICK[..]].concat(), status);
-        let doubt = "lengths of up to 70 mm can be trusted to 0.20 mm";
+        let doubt = "lengths of up to 70 mm can be trusted to 0.200 mm";
         assert_eq!(said.contains(doubt), verdict != "pass", "{verdict}: {said}");
     }
 }

@@ -72,22 +72,6 @@ fn corresponding_corners_stand_on_one_row() {
     let page = std::fs::read_to_string(folder.path().join("out/rectify.html")).unwrap();
     assert!(page.contains("Epipolar lines") && page.contains("data:image/jpeg;base64,"));
 
-    // The board is that of the calibration, where the file says it; the settings know other ones only.
-    let settings = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 25.0\n";
-    std::fs::write(folder.path().join("other.toml"), settings).unwrap();
-    let mut known = json(&folder.path().join("truth/calibration.json"));
-    for (board, found) in [(None, false), (Some("checker:20x20:10"), true), (Some("no board"), false)] {
-        if let Some(board) = board {
-            known["board"] = board.into();
-        }
-        std::fs::write(folder.path().join("known.json"), known.to_string()).unwrap();
-        let arguments =
-            ["rectify", "one", "--calibration", "known.json", "--config", "other.toml", "--out", "known", "--force"];
-        let said = done(folder.path(), &arguments);
-        assert_eq!(said.contains("corners of the 20x20 board"), found, "{board:?}: {said}");
-        assert_eq!(said.contains("no board was seen"), !found, "{board:?}: {said}");
-    }
-
     // A rig that is not the pictures' own: its right camera is turned by 0.1 degrees about its x axis.
     let truth = folder.path().join("truth/calibration.json");
     let mut turned = json(&truth);
@@ -122,7 +106,10 @@ fn corresponding_corners_stand_on_one_row() {
     std::fs::write(folder.path().join("doubted.json"), doubted.to_string()).unwrap();
     let untrusted =
         stereocal(folder.path(), &["export", "calibration", "--format", "ros", "--calibration", "doubted.json"]);
-    assert!(untrusted.status.code() == Some(0) && stderr(&untrusted).contains("no length can be trusted"));
+    assert!(
+        untrusted.status.code() == Some(0)
+            && stderr(&untrusted).contains("to what its lengths can be trusted is not known")
+    );
     // What is out of tolerance, whatever the uncertainty, makes nothing that states no uncertainty without a word in the status.
     doubted["check"]["verdict"] = "fail".into();
     std::fs::write(folder.path().join("failed.json"), doubted.to_string()).unwrap();
@@ -134,6 +121,66 @@ fn corresponding_corners_stand_on_one_row() {
     assert!(page("out").contains("<div class=\"verdict good\"><strong>Rectified<"));
     let rms = number(&json(&folder.path().join("turned/rectified.json")), "/residual/rms_px");
     assert!(rms > 20.0 * ROWS_PX, "{rms}");
+}
+
+#[test]
+fn the_board_is_the_one_that_the_pictures_show_and_its_size_tells_disparities_that_are_off() {
+    let folder = world();
+    let at = |name: &str| folder.path().join(name);
+    // The settings know other boards than that of the pictures, and of the files one knows it.
+    let settings = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 25.0\n";
+    std::fs::write(at("other.toml"), settings).unwrap();
+    let rectified = |rig: &Value, pictures: &str| {
+        std::fs::write(at("rig.json"), rig.to_string()).unwrap();
+        let given = ["--calibration", "rig.json", "--config", "other.toml", "--out", "known", "--force"];
+        stereocal(folder.path(), &[&["rectify", pictures], &given[..]].concat())
+    };
+    let mut rig = json(&at("truth/calibration.json"));
+    for (board, is_another) in [(None, true), (Some("checker:11x8:25"), true), (Some("checker:20x20:10"), false)] {
+        if let Some(board) = board {
+            rig["board"] = board.into();
+        }
+        let done = rectified(&rig, "one");
+        assert_eq!(done.status.code(), Some(0), "{}", stderr(&done));
+        assert!(stdout(&done).contains("corners of the 20x20 board"), "{board:?}: {}", stdout(&done));
+        assert_eq!(stderr(&done).contains("those of one of 20x20 squares"), is_another, "{board:?}: {}", stderr(&done));
+        let size = &json(&at("known/rectified.json"))["size"];
+        assert_eq!(size.is_null(), is_another, "{board:?}: {size}");
+    }
+    let is_off = |rig: &Value| {
+        let done = rectified(rig, "one");
+        let said = stderr(&done).contains("the disparities are off by");
+        assert!(!said || done.status.code() == Some(1), "{}", stderr(&done));
+        said
+    };
+    // The right picture moved along its rows, by what lengths show and by what they leave open.
+    rig["right"]["cx"] = (number(&rig, "/right/cx") + 4.0).into();
+    rig.as_object_mut().unwrap().remove("covariance");
+    let check =
+        |trusted_mm: f64| serde_json::json!({"verdict": "pass", "tolerance_mm": 0.05, "trusted_mm": trusted_mm});
+    rig["check"] = check(0.02);
+    assert!(is_off(&rig));
+    let page = std::fs::read_to_string(at("known/rectify.html")).unwrap();
+    assert!(page.contains("The disparities are off") || page.contains("The rows do not agree"));
+    let off_px = number(&json(&at("known/rectified.json")), "/size/disparity_px");
+    assert!((2.0..8.0).contains(&off_px.abs()), "{off_px}");
+    rig["check"] = check(100.0);
+    assert!(!is_off(&rig));
+
+    // Nothing is seen: what was looked for is said.
+    for side in ["left", "right"] {
+        std::fs::create_dir_all(at("blank").join(side)).unwrap();
+        let file = at("check").join(side).join(first(folder.path()));
+        let raw = image::open(file).unwrap();
+        image::GrayImage::from_pixel(raw.width(), raw.height(), image::Luma([90]))
+            .save(at("blank").join(side).join("1.png"))
+            .unwrap();
+    }
+    let blank = stdout(&rectified(&rig, "blank"));
+    assert!(
+        blank.contains("no board was seen in the rectified pictures (looked for: 20x20, 9x7, 7x6 squares)"),
+        "{blank}"
+    );
 }
 
 #[test]

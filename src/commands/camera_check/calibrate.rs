@@ -162,12 +162,11 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
     };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
     let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
+    let [measured, said] = [board, drawn].map(|board| board.side_said());
+    let said = if measured == said { "as was said".to_owned() } else { format!("not {said} mm") };
     progress::note(format!(
-        "by its measured extent the board has {} of {:.4} x {:.4} mm, not {} mm; by a caliper, to {uncertainty_mm:.4} mm in all",
-        board.unit(),
-        board.sides_mm()[0],
-        board.sides_mm()[1],
-        drawn.side_said()
+        "by its measured extent the board has {} of {measured} mm, {said}; by a caliper, to {uncertainty_mm:.4} mm in all",
+        board.unit()
     ));
     Ok((warm(args, board)?, Some(uncertainty_mm)))
 }

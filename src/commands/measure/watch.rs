@@ -96,7 +96,9 @@ fn look(source: &Source<'_>, out: &OutDir, arrivals: &mut BTreeMap<&str, Arrival
             ready.push((files, arrival));
         }
     }
-    let look = |(files, arrival): (PairFiles, &mut Arrival)| match find::find_pair(&files, wanted) {
+    let look = |(files, arrival): (PairFiles, &mut Arrival)| match find::find_pair(&files, wanted)
+        .map_err(|refusal| refusal.reason)
+    {
         Err(reason) if UNREAD.iter().any(|words| reason.contains(words)) => {
             if arrival.unchanged >= PATIENCE && !arrival.said {
                 arrival.said = true;

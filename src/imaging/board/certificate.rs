@@ -9,6 +9,7 @@ use super::dictionary::Dictionary;
 use super::layout::Layout;
 use super::pitch::Pitch;
 use super::squares::Squares;
+use crate::diagnostic::short;
 use crate::imaging::lattice::turned_place;
 
 /// Sides of squares, mm: from a wafer's to a car park's.
@@ -130,12 +131,18 @@ impl Board {
         }
     }
 
-    /// The side of a square for a person, mm: a width and a height where they differ.
-    pub fn side_said(&self) -> String {
+    /// The side of a square as it is written, mm: a width and a height where they differ.
+    pub fn side_written(&self) -> String {
         match self.sides_mm() {
             [width, _] if self.stretch == 1.0 => width.to_string(),
             [width, height] => format!("{width}x{}", (height * 1e9).round() / 1e9),
         }
+    }
+
+    /// The same for a person.
+    pub fn side_said(&self) -> String {
+        let [width, height] = self.sides_mm().map(short);
+        if width == height { width } else { format!("{width}x{height}") }
     }
 
     /// Number of inner corners along x.

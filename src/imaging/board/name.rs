@@ -14,7 +14,7 @@ use super::squares::Squares;
 impl fmt::Display for Board {
     /// As it is named on the command line.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (squares, side) = (self.squares, self.side_said());
+        let (squares, side) = (self.squares, self.side_written());
         match self.kind {
             Kind::Checker => write!(f, "checker:{squares}:{side}"),
             Kind::Charuco { marker_mm, dictionary, layout } => {

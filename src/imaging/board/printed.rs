@@ -74,9 +74,21 @@ impl PrintedExtent {
             (across, along)
         };
         let scaled = board.scaled(width);
-        // As a person writes it: 10.05 for twenty squares in 201 mm.
-        let square_mm = (scaled.square_mm * 1e9).round() / 1e9;
-        Ok(Printed { board: Board { square_mm, stretch: board.stretch * height / width, ..scaled }, uncertainty_mm })
+        // As a person writes them: 10.05 for twenty squares in 201 mm.
+        let [square_mm, height_mm] = [scaled.square_mm, board.sides_mm()[1] * height].map(as_written_mm);
+        Ok(Printed { board: Board { square_mm, stretch: height_mm / square_mm, ..scaled }, uncertainty_mm })
+    }
+
+    /// The extent in mm and the unit in which it was written, where the board has it in another one.
+    fn in_another_unit(&self, board: &Board) -> Option<([f64; 2], &'static str)> {
+        const UNITS: [(f64, &str); 3] = [(10.0, "cm"), (25.4, "inches"), (1000.0, "m")];
+        let whole = board.extent_mm();
+        let of = |(unit_mm, name): (f64, &'static str)| {
+            let mm = self.mm.map(|value| as_written_mm(value * unit_mm));
+            let is = |extent: [f64; 2]| (0..2).all(|k| (mm[k] / extent[k] - 1.0).abs() <= MOST_STRETCH);
+            (is(whole) || is([whole[1], whole[0]])).then_some((mm, name))
+        };
+        UNITS.into_iter().find_map(of)
     }
 
     /// A board that was printed smaller or larger as a whole, and how it is then given.
@@ -104,7 +116,9 @@ impl PrintedExtent {
     /// Why the extent is not the board's.
     fn another(&self, board: &Board, is_exchanged: bool, is_inner: bool) -> String {
         let ([width, height], nominal) = (self.mm, board.extent_mm());
-        let why = if is_exchanged {
+        let why = if let Some(([across, along], unit)) = self.in_another_unit(board) {
+            format!("it is that in {unit}; in mm it is `--measured-mm {across}x{along}`")
+        } else if is_exchanged {
             "width and height are exchanged".to_owned()
         } else if is_inner {
             "that is the extent of its inner corners: measure from the outer edge of the first square to that of the last".to_owned()
@@ -126,10 +140,15 @@ impl PrintedExtent {
         format!(
             "a printed extent of {width} x {height} mm is not that of {}, {} x {} mm: {why}",
             board.said(),
-            (nominal[0] * 1e9).round() / 1e9,
-            (nominal[1] * 1e9).round() / 1e9
+            as_written_mm(nominal[0]),
+            as_written_mm(nominal[1])
         )
     }
+}
+
+/// A length without what a double makes of its last digits.
+fn as_written_mm(mm: f64) -> f64 {
+    (mm * 1e9).round() / 1e9
 }
 
 #[cfg(test)]
@@ -153,6 +172,13 @@ mod tests {
         // A plain board may lie on either side.
         let lying = measured("checker:10x8:15", "120.6x149.7").unwrap();
         assert_eq!(lying.board, measured("checker:10x8:15", "149.7x120.6").unwrap().board);
+        // Sides that are no short numbers are told in few digits, and exact ones stay exact.
+        let thirds = measured("checker:9x7:30", "266.5x210.0").unwrap().board;
+        assert_eq!(
+            (thirds.said(), thirds.to_string()),
+            ("9x7 squares of 29.61111x30 mm".to_owned(), "checker:9x7:29.611111111x30".to_owned())
+        );
+        assert!((thirds.spans_mm(5)[1] - 150.0).abs() < 1e-12);
         // And of a square one the sides are not told apart.
         let square = measured("checker:10x10:15", "149.7x150.1").unwrap();
         assert!(square.board.stretch == 1.0 && (square.board.square_mm - 14.99).abs() < 1e-12);
@@ -171,6 +197,11 @@ mod tests {
             ("checker:11x8:20", "213.4x155.2", "`--squares 11x8 --square-mm 19.4`"),
             ("checker:11x8:20", "155.2x213.4", "width and height are exchanged, and it was printed -3.0 %"),
             (coded, "150x112", "+0.0 % and -6.7 %"),
+            ("checker:10x7:25", "25x17.5", "it is that in cm; in mm it is `--measured-mm 250x175`"),
+            ("checker:10x7:25", "17.5x25", "`--measured-mm 175x250`"),
+            ("checker:10x7:25.4", "10x7", "it is that in inches"),
+            // A tenth as large is no mistake of the unit where the sides are not those of the board.
+            ("checker:10x7:25", "25x16", "-90.0 % and -90.9 %"),
         ] {
             let said = measured(board, extent).unwrap_err();
             assert!(said.contains(why), "{board} {extent}: {said}");

@@ -58,10 +58,12 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Option<
     other_markers(picture, board, (dictionary, own), grid)
 }
 
+/// How the reason ends where a grid of corners holds no marker.
+pub const UNREAD: &str = "and no marker among them that can be read";
+
 /// What is said of grids in which nothing was read.
 pub fn unread(grids: &[Places]) -> Refusal {
-    let corners =
-        |grid: &Places| format!("shows {} corners of squares, and no marker among them that can be read", grid.count());
+    let corners = |grid: &Places| format!("shows {} corners of squares, {UNREAD}", grid.count());
     largest(grids).map_or_else(|| "no board found".to_owned(), corners).into()
 }
 

@@ -187,6 +187,26 @@ fn another_board_is_named() {
 }
 
 #[test]
+fn a_plain_board_is_counted_where_markers_were_looked_for() {
+    let plain = "checker:9x7:20";
+    let (picture, _) = Shot::of(plain, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+    for (said, seen) in [
+        ("charuco:10x7:20:14:DICT_5X5_100", Some("checker:9x7:20")),
+        (TAGS, Some("checker:9x7:24")),
+        (BOARD, None),
+        ("charuco:7x9:20:14:DICT_5X5_100", None),
+    ] {
+        let refusal = refused(&picture, said);
+        assert!(
+            refusal.reason.starts_with("shows a board of 9x7 squares, and no marker"),
+            "{said}: {}",
+            refusal.reason
+        );
+        assert_eq!(refusal.seen, seen.map(|seen| seen.parse().unwrap()), "{said}");
+    }
+}
+
+#[test]
 fn the_other_layout_is_named_or_leaves_no_number() {
     for (shown, said) in [("new", "old"), ("old", "new")] {
         for size in ["8x6", "9x8"] {

@@ -1,6 +1,6 @@
 //! The verdict in words, and the table on stdout.
 
-use crate::diagnostic::{at_most, capital, count, two_digits};
+use crate::diagnostic::{at_most, capital, count, short, two_digits};
 use crate::files::OutDir;
 use crate::imaging::corners::named;
 use crate::report::table::{Table, number};
@@ -64,7 +64,7 @@ fn ranges(judged: &Judged) -> Table {
         shown.dedup();
         for range in shown.into_iter().filter_map(|i| ranges.get(i)) {
             table.row([
-                format!("{name} {}", range.nominal_mm),
+                format!("{name} {}", short(range.nominal_mm)),
                 range.count.to_string(),
                 number(Some(range.mean_error_mm), 4),
                 number(Some(range.std_mm), 4),

@@ -193,7 +193,14 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64,
             calibration.board.unit(),
             said * (1.0 + stretch),
         ),
-        remedy: Some("measure the board along and across, and give `--measured-mm WxH`".to_owned()),
+        remedy: Some(match calibration.board.stretch == 1.0 {
+            true => "measure the board along and across, and give `--measured-mm WxH`".to_owned(),
+            // Both sides were said.
+            false => format!(
+                "the sides that were given, {} mm, contradict the pictures: measure the board along and across once more",
+                calibration.board.side_said()
+            ),
+        }),
         ..Finding::default()
     })
 }

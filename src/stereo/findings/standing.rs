@@ -11,6 +11,7 @@ use nalgebra::DVector;
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
+use crate::stereo::error::BY_SINCE;
 use crate::stereo::findings::{
     self, Finding, Kind, common_misfit, hold, one_side, other_rig, rolling_shutter, without_drift,
 };
@@ -184,11 +185,17 @@ fn of_rig(change: &Finding) -> Cause {
 pub fn calibrate_since(corners: &Corners, pair: &str, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let names = || corners.pairs.iter().map(|p| p.pair.clone()).collect();
     let kept = since(corners, pair).ok_or_else(|| Error::NoSuchPair { pair: pair.to_owned(), pairs: names() })?;
-    let (mut found, told) = calibrate_standing(&kept, asked)?;
     let before = corners.pairs.iter().take_while(|p| p.pair != pair);
-    let reason = format!("it was taken before pair {pair}, which --since names");
+    let reason = format!("it was taken before pair {pair}, {BY_SINCE}");
     let before: Vec<DiscardedPair> =
         before.map(|p| DiscardedPair::new(&p.pair, Cause::Before, reason.clone())).collect();
+    let (mut found, told) = calibrate_standing(&kept, asked).map_err(|error| match error {
+        Error::TooFewPairs { found, needed, total, mut skipped } => {
+            skipped.extend(before.iter().map(DiscardedPair::skipped));
+            Error::TooFewPairs { found, needed, total: total + before.len(), skipped }
+        }
+        other => other,
+    })?;
     leave_out(&mut found, before);
     Ok((found, told))
 }

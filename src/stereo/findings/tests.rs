@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::geometry::transform;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::standing::{Asked, calibrate_standing};
+use crate::stereo::findings::standing::{Asked, calibrate_since, calibrate_standing};
 use crate::stereo::findings::{Finding, Kind, hold};
 use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::verdict::Verdict;
@@ -253,7 +253,28 @@ fn a_board_whose_squares_are_not_as_wide_as_high_as_was_said_is_named_by_its_rat
         assert_eq!(finding.cause, "other-board", "{stretch}: {finding:?}");
         let off = finding.size.unwrap() / 100.0 - (1.0 / (1.0 + stretch) - 1.0);
         assert!(off.abs() < 1e-4, "{stretch}: {finding:?}");
+        // Both sides were given: giving them is no advice.
+        let remedy = finding.remedy.as_ref().unwrap();
+        assert!(remedy.contains("once more") && !remedy.contains("--measured-mm"), "{remedy}");
     }
+}
+
+#[test]
+fn pairs_that_since_leaves_out_are_why_too_few_remain() {
+    use crate::diagnostic::Explain;
+
+    let corners = World::new(8, 1).corners(1);
+    let hint = |corners: &Corners, pair: &str| {
+        let error = calibrate_since(corners, pair, &asked(BROWN4)).unwrap_err();
+        (error.to_string(), error.hint().unwrap())
+    };
+    let (said, told) = hint(&corners, &corners.pairs[7].pair);
+    assert!(said.starts_with("only 1 of 8 pairs") && said.contains("--since"), "{said}");
+    assert!(told.contains("`--since` an earlier pair"), "{told}");
+    // Where there are no others it is no cause.
+    let few = Corners { pairs: corners.pairs[..2].to_vec(), ..corners.clone() };
+    let (_, told) = hint(&few, &few.pairs[0].pair);
+    assert!(!told.contains("--since"), "{told}");
 }
 
 /// The pairs' first common rig is that of a flat board; what is said of all pairs is said of the rig that is stated.

@@ -80,7 +80,7 @@ impl Evidence {
         }
     }
 
-    /// Value and limit for a page: lengths, which are what an error is at most, with two digits and rounded up; a limit as it was given.
+    /// Value and limit for a page: lengths, which are what an error is at most, with three digits and rounded up; a limit as it was given.
     pub fn rounded(&self) -> [Option<String>; 2] {
         let is_length = self.unit == "mm";
         let value = self.value.map(|value| match self.limit {

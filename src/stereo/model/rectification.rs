@@ -4,12 +4,13 @@
 //! turn until x lies along the baseline), where a raw point falls, and how far the rows of measured points differ. Goes wrong: cameras
 //! that look at each other, or one that stands in front of the other, have no common rows.
 
-use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Point3, Vector3};
+use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Point3, Vector3, Vector4};
 use serde::Serialize;
 
-use crate::geometry::rotation_matrix;
-use crate::imaging::PairCorners;
+use crate::geometry::{cross_covariance, rotation_matrix};
+use crate::imaging::{Board, Corner, PairCorners};
 use crate::opencv::{Failure, Lens, ZERO_DISPARITY, stereo_rectify, undistort_points};
+use crate::statistics::median;
 use crate::stereo::data::residuals::root_mean_square;
 use crate::stereo::{Camera, Rig, Side};
 
@@ -114,7 +115,7 @@ pub struct RowResidual {
 pub fn row_differences(pair: &PairCorners, in_columns: bool) -> Vec<(Point2<f64>, f64)> {
     let right = |col, row| pair.right.iter().find(|c| (c.col, c.row) == (col, row) && c.used);
     let along = |p: Point2<f64>| if in_columns { p.x } else { p.y };
-    let of = |left: &crate::imaging::Corner| Some((left.px, along(left.px) - along(right(left.col, left.row)?.px)));
+    let of = |left: &Corner| Some((left.px, along(left.px) - along(right(left.col, left.row)?.px)));
     pair.left.iter().filter(|c| c.used).filter_map(of).collect()
 }
 
@@ -127,8 +128,69 @@ pub fn row_residual(differences: &[f64]) -> Option<RowResidual> {
     })
 }
 
+/// How large a board of known size comes out of the disparities of its corners: what turns the cameras about the common columns leaves the rows as they
+/// are and changes that.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SizeResidual {
+    pub pairs: usize,
+    /// How many times as large as it is, in the middle one of the pairs.
+    pub times: f64,
+    /// By how much the disparities are larger than they would be if the board came out as large as it is, px, in the middle one of the pairs.
+    pub disparity_px: f64,
+    /// By how much the board's diagonal comes out longer, mm.
+    pub diagonal_mm: f64,
+    /// What lengths can be trusted to by the rig's own calibration, mm.
+    pub trusted_mm: Option<f64>,
+}
+
+impl SizeResidual {
+    /// Of corners in rectified pictures; `None` where no pair has enough of them.
+    pub fn of(pairs: &[PairCorners], board: &Board, matrices: &Matrices) -> Option<SizeResidual> {
+        let each: Vec<(f64, f64)> = pairs.iter().filter_map(|pair| size_of(pair, board, matrices)).collect();
+        let times = median(each.iter().map(|(times, _)| *times))?;
+        let disparity_px = median(each.iter().map(|(_, off_px)| *off_px))?;
+        let diagonal_mm = (times - 1.0) * board.diagonal_mm();
+        Some(SizeResidual { pairs: each.len(), times, disparity_px, diagonal_mm, trusted_mm: None })
+    }
+
+    /// The same beside what lengths can be trusted to.
+    pub fn against(self, trusted_mm: Option<f64>) -> SizeResidual {
+        SizeResidual { trusted_mm, ..self }
+    }
+}
+
+/// How many times as large as it is the board of a pair comes out, and by how much the disparities of its corners are off then, px.
+///
+/// Method: the similarity that fits the corners to the board's (Umeyama, 1991); a depth goes with one over the disparity.
+fn size_of(pair: &PairCorners, board: &Board, matrices: &Matrices) -> Option<(f64, f64)> {
+    /// Fewer corners are no board.
+    const FEWEST: usize = 4;
+    let q = &matrices.disparity_to_depth;
+    let along = |px: Point2<f64>| if matrices.in_columns() { px.y } else { px.x };
+    let right = |left: &&Corner| pair.right.iter().find(|c| (c.col, c.row) == (left.col, left.row) && c.used);
+    let both = pair.left.iter().filter(|c| c.used).filter_map(|left| Some((left, right(&left)?)));
+    let of = |(left, right): (&Corner, &Corner)| {
+        let at = q * Vector4::new(left.px.x, left.px.y, along(left.px) - along(right.px), 1.0);
+        let place = Point3::from(at.xyz() / at.w);
+        place.iter().all(|mm| mm.is_finite()).then_some((board.corner_mm(left.col, left.row), place, at.w / q[(3, 2)]))
+    };
+    let seen: Vec<(Point3<f64>, Point3<f64>, f64)> = both.filter_map(of).collect();
+    if seen.len() < FEWEST {
+        return None;
+    }
+    let on_board = || seen.iter().map(|(mm, ..)| (*mm, *mm, 1.0));
+    let spread = cross_covariance(on_board()).2.trace();
+    let (.., products) = cross_covariance(seen.iter().map(|(mm, place, _)| (*mm, *place, 1.0)));
+    let times = products.singular_values().sum() / spread;
+    let disparity_px = median(seen.iter().map(|(.., px)| *px))?;
+    let as_large_px = q[(3, 2)].signum() * disparity_px.abs() * times;
+    (times.is_finite() && times > 0.0).then_some((times, disparity_px - as_large_px))
+}
+
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
+
     use super::*;
     use crate::geometry::transform;
     use crate::stereo::Lens;
@@ -176,6 +238,54 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_board_of_another_size_tells_disparities_that_are_off() {
+        let board: Board = "checker:10x7:25".parse().unwrap();
+        for (right_mm, in_columns) in [(Vector3::new(180.0, 2.0, -5.0), false), (Vector3::new(3.0, 150.0, 4.0), true)] {
+            for scaling in [Scaling::OPENCV, Scaling { alpha: 0.5, zero_disparity: false }] {
+                let rig = rig(Lens::Brown5, right_mm);
+                let matrices = Matrices::new(&rig, scaling).unwrap();
+                // The right picture moved along the rows: they agree as before.
+                let pair = |tilt_rad: f64, moved_px: f64| {
+                    let pose = transform(Vector3::new(0.1, tilt_rad, 0.3), Vector3::new(5.0, -8.0, 600.0));
+                    let seen = |col, row| rectified(&rig, &matrices, pose * board.corner_mm(col, row));
+                    let along = if in_columns { Vector2::y() } else { Vector2::x() };
+                    let step = along * moved_px;
+                    let places = (0..board.corner_count()).map(|index| board.place(index));
+                    let both = places.map(|(col, row)| {
+                        (Corner::at(col, row, seen(col, row)[0]), Corner::at(col, row, seen(col, row)[1] + step))
+                    });
+                    let (left, right) = both.unzip();
+                    PairCorners { pair: "1".to_owned(), left, right }
+                };
+                let of = |moved_px: f64| {
+                    let pairs = [-0.3, 0.0, 0.3].map(|tilt_rad| pair(tilt_rad, moved_px));
+                    assert!(
+                        pairs
+                            .iter()
+                            .all(|pair| row_differences(pair, in_columns).iter().all(|(_, d)| d.abs() < ROUNDING))
+                    );
+                    SizeResidual::of(&pairs, &board, &matrices).unwrap()
+                };
+                let right = of(0.0);
+                assert!((right.times - 1.0).abs() < 1e-9 && right.disparity_px.abs() < 1e-6, "{right:?}");
+                for moved_px in [-6.0, 3.0] {
+                    let off = of(moved_px);
+                    assert!((off.disparity_px + moved_px).abs() < 0.15 * f64::abs(moved_px), "{moved_px}: {off:?}");
+                    assert!(off.diagonal_mm.signum() == moved_px.signum() * right_mm.sum().signum(), "{off:?}");
+                }
+            }
+        }
+        assert_eq!(
+            SizeResidual::of(
+                &[PairCorners::default()],
+                &board,
+                &Matrices::new(&rig(Lens::Brown5, Vector3::x() * 180.0), Scaling::OPENCV).unwrap()
+            ),
+            None
+        );
     }
 
     #[test]

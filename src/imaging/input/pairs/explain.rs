@@ -143,15 +143,23 @@ pub fn none(source: &Source<'_>, folders: &[Folder], readings: &[Reading]) -> Er
     let (statement, hint) = match best {
         _ if pictures == 0 => without_pictures(source, folders),
         Some(reading) => unmatched(source, reading),
-        None => match one_side(folders) {
-            Some((have, lacks)) => (
+        None => match (one_side(folders), empty_side(folders)) {
+            (_, Some((empty, side))) => (
+                format!("{}/ holds no pictures", empty.file_name().unwrap_or(empty.as_str())),
+                format!(
+                    "the {} camera's pictures go there; or name the folders of both: {}",
+                    side.name(),
+                    by_hand(source)
+                ),
+            ),
+            (Some((have, lacks)), None) => (
                 format!("there is {have}/ but no {lacks}/"),
                 match left_first(&holding).as_slice() {
                     [a, b] => call(source, &[&a.path, &b.path], ""),
                     _ => by_hand(source),
                 },
             ),
-            None => untold(source, &holding, pictures),
+            (None, None) => untold(source, &holding, pictures),
         },
     };
     let statement = statement + &found(&holding);
@@ -210,6 +218,16 @@ fn one_side(folders: &[Folder]) -> Option<(&'static str, &'static str)> {
         (false, true) => Some(("right", "left")),
         _ => None,
     }
+}
+
+/// A folder of one side without pictures, beside one of the other side with some.
+fn empty_side(folders: &[Folder]) -> Option<(&Utf8PathBuf, Side)> {
+    let top = folders.first()?;
+    let side = |path: &Utf8PathBuf| Open::new(path.file_name()?, Reach::Words).side();
+    let holds = |path: &Utf8PathBuf| folders.iter().any(|f| !f.pictures.is_empty() && f.path.starts_with(path));
+    let is_full = |wanted: Side| top.folders.iter().any(|path| side(path) == Some(wanted) && holds(path));
+    let mut empty = top.folders.iter().filter(|path| !holds(path)).filter_map(|path| Some((path, side(path)?)));
+    empty.find(|(_, side)| is_full(side.other()))
 }
 
 /// The folders below the one that was named, those with a word for left first and for right last.

@@ -228,6 +228,10 @@ fn folders_without_pairs_say_what_they_hold() {
             None,
             "which of these 3 folders are left and right is not told  board/: 1 picture (1.png)",
         ),
+        ("left/{1,2}.png right/x.txt", None, "right/ holds no pictures  camera-check LEFT RIGHT`"),
+        ("right/{1,2}.png left/x.txt", None, "left/ holds no pictures"),
+        // Neither holds one: nothing is missing on one side.
+        ("left/x.txt right/x.txt", None, "there are no pictures here"),
         // A grid of two positions with two repetitions: either may be the camera.
         ("p{1,2}_{1,2}.png", None, "in 2 ways  into a folder of its own"),
         // One pair beside two folders with more.

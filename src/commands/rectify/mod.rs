@@ -1,9 +1,12 @@
 //! `stereocal rectify`: pairs of pictures undistorted, on common rows, for eyes and for dense stereo.
 
+mod rows;
+
 use camino::Utf8Path;
 use nalgebra::{Matrix3, Point2};
 use rayon::prelude::*;
 
+use self::rows::{boards, look_for};
 use super::heed::{RigDoubts, heed_rig};
 use super::{Outcome, Result};
 use crate::cli::Rectify;
@@ -12,14 +15,13 @@ use crate::diagnostic::Status;
 use crate::files::provenance::Run;
 use crate::files::{self, OutDir};
 use crate::formats::calibration;
-use crate::formats::rectified::{Coverage, RectifiedFile, RectifiedPair};
-use crate::imaging::find::find_pair;
+use crate::formats::rectified::{Coverage, RectifiedFile};
 use crate::imaging::image::raster::{Raster, Samples};
 use crate::imaging::image::{self, Claim, Header};
 use crate::imaging::input::pairs::PairFiles;
-use crate::imaging::{self, Board, PairCorners, Skipped, Wanted};
+use crate::imaging::{self, Skipped};
 use crate::opencv::{Failure, Map, remap, undistort_rectify_map};
-use crate::stereo::model::rectification::{Matrices, Scaling, row_differences, row_residual};
+use crate::stereo::model::rectification::{Matrices, Scaling};
 use crate::stereo::volume::Volume;
 use crate::stereo::{self, Rig, Side};
 use crate::{progress, report};
@@ -27,14 +29,12 @@ use crate::{progress, report};
 /// Share of a rectified picture below which it shows too little to be of use.
 const LITTLE: f64 = 0.25;
 
-/// Pairs on which each board is looked for before it is taken as not there: on pictures of something else the search takes seconds.
-const FIRST_LOOKED_AT: usize = 4;
-
 pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let out = OutDir::open(args.output.out.as_deref().unwrap_or(&config.out))?;
     let rig_file = calibration::file(args.calibration.as_deref(), out.path(), &config.out)?;
     let calibrated = calibration::read(&rig_file)?;
     let RigDoubts { said: mut doubts, status_without_uncertainty: at_best, .. } = heed_rig(&calibrated, &rig_file);
+    let trusted_mm = calibrated.trusted_mm();
     let calibration::Calibrated { rig, board, volume, .. } = calibrated;
     let run = Run { force: args.output.force, ..run };
     let source = args.pairs.source("rectify", &args.images);
@@ -48,7 +48,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&to_write)?;
     out.check_free(&["rectified.json", "rectify.html"])?;
 
-    let (mut file, maps, lost) = plan(args, &rig, volume.as_ref())?;
+    let Plan { mut file, maps, matrices, lost } = plan(args, &rig, volume.as_ref())?;
     let bar = progress::bar("rectifying", pairing.pairs.len() as u64);
     let done: Vec<std::result::Result<(), String>> = (pairing.pairs.par_iter(), &headers, &names)
         .into_par_iter()
@@ -62,32 +62,43 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
         })
         .collect::<Result<_, files::Error>>()?;
     bar.finish_and_clear();
-    let mut kept = Vec::new();
-    for ((files, names), outcome) in pairing.pairs.iter().zip(names).zip(done) {
-        match outcome {
-            Ok(()) => kept.push((files.pair.clone(), names)),
-            Err(reason) => {
-                progress::warn(format!("pair {} is not rectified: {reason}", files.pair));
-                file.pairs_skipped.push(Skipped { pair: files.pair.clone(), reason });
-            }
-        }
-    }
+    let kept = kept(pairing.pairs.iter().zip(names).zip(done), &mut file.pairs_skipped);
     if kept.is_empty() {
         return Err(imaging::Error::NoneReadable { path: pairing.place, skipped: file.pairs_skipped }.into());
     }
     let rectified = written(&out, &kept);
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
-    let (file, shown) = judge(file, kept, found);
-    let of_rows = report::rectify::doubt(&file);
-    of_rows.iter().filter(|_| lost.is_none()).for_each(progress::warn);
-    let status = if lost.is_some() || of_rows.is_some() { Status::OutOfTolerance } else { Status::Done };
+    file.size = rows::size(found.as_ref(), board, matrices.as_ref()).map(|size| size.against(trusted_mm));
+    let (file, shown) = rows::judge(file, kept, found, &boards);
+    let of_board = report::rectify::doubts(&file);
+    of_board.iter().filter(|_| lost.is_none()).for_each(progress::warn);
+    let is_in_doubt = lost.is_some() || !of_board.is_empty();
+    let status = if is_in_doubt { Status::OutOfTolerance } else { Status::Done };
     let json = out.write_json("rectified.json", &file)?;
-    doubts.extend(lost.into_iter().chain(of_rows));
+    doubts.extend(lost.into_iter().chain(of_board));
     let page = report::rectify::page(&file, &rectified, shown.as_ref(), &doubts)?;
     report::page::write(&out, "rectify.html", page)?;
     let stdout = if args.output.json { json } else { report::rectify::summary(&file, &out) };
     Ok(Outcome { stdout, status: status.or_worse(at_best) })
+}
+
+/// The pairs that were written; the others go to those that were skipped, with a word.
+fn kept<'a>(
+    pairs: impl Iterator<Item = ((&'a PairFiles, [String; 2]), std::result::Result<(), String>)>,
+    skipped: &mut Vec<Skipped>,
+) -> Vec<(String, [String; 2])> {
+    let mut kept = Vec::new();
+    for ((files, names), outcome) in pairs {
+        match outcome {
+            Ok(()) => kept.push((files.pair.clone(), names)),
+            Err(reason) => {
+                progress::warn(format!("pair {} is not rectified: {reason}", files.pair));
+                skipped.push(Skipped { pair: files.pair.clone(), reason });
+            }
+        }
+    }
+    kept
 }
 
 /// The pairs as they were written.
@@ -132,8 +143,17 @@ fn remapped(raw: &Raster, map: &Map) -> Result<Raster, Failure> {
     Ok(Raster { width, height, channels: raw.channels, samples })
 }
 
-/// What will be done to the pictures, and what is said of it; last, that they will not show where the boards of the calibration stood.
-fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<(RectifiedFile, [Map; 2], Option<String>)> {
+/// What will be done to the pictures, and what is said of it.
+struct Plan {
+    file: RectifiedFile,
+    maps: [Map; 2],
+    /// Of common rows.
+    matrices: Option<Matrices>,
+    /// That the pictures will not show where the boards of the calibration stood.
+    lost: Option<String>,
+}
+
+fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<Plan> {
     let (width, height) = (rig.left.width, rig.left.height);
     let map = |side: Side, r: &Matrix3<f64>, p: &Matrix3<f64>, size| {
         let camera = rig.camera(side);
@@ -154,7 +174,8 @@ fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<(Rectified
     if args.undistort_only {
         let alone = |side: Side| map(side, &Matrix3::identity(), &rig.camera(side).matrix(), raw[side as usize]);
         let maps = [alone(Side::Left)?, alone(Side::Right)?];
-        return Ok((RectifiedFile::undistorted(rig, coverage(&maps)), maps, None));
+        let file = RectifiedFile::undistorted(rig, coverage(&maps));
+        return Ok(Plan { file, maps, matrices: None, lost: None });
     }
     let alpha = args.alpha.unwrap_or(Scaling::OPENCV.alpha);
     let scaling = Scaling { alpha, zero_disparity: args.zero_disparity };
@@ -179,7 +200,8 @@ fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<(Rectified
     }
     let lost = volume.and_then(|volume| lost(volume, rig, &matrices));
     lost.iter().for_each(progress::warn);
-    Ok((RectifiedFile::rectified(rig, &matrices, scaling, coverage), maps, lost))
+    let file = RectifiedFile::rectified(rig, &matrices, scaling, coverage);
+    Ok(Plan { file, maps, matrices: Some(matrices), lost })
 }
 
 /// That a rectified picture does not show the middle of where the boards stood: common rows look at right angles to the line between the cameras,
@@ -223,76 +245,6 @@ fn rectified(
         rectified.png().ok_or_else(|| say("cannot be written as PNG".to_owned()))
     };
     Ok([one(Side::Left, &files.left)?, one(Side::Right, &files.right)?])
-}
-
-/// The boards that may be in the pictures: where none is named the one that calibrated first.
-fn boards(args: &Rectify, config: &Config, calibrated: Option<Board>) -> Result<Vec<Board>> {
-    let check = config.check_board.board(args.board, args.squares, None)?;
-    let target = config.target_board.board(args.board, args.squares, None)?;
-    let named = args.board.is_some() || args.squares.is_some();
-    let mut boards = Vec::new();
-    for board in calibrated.filter(|_| !named).into_iter().chain([check, target]) {
-        if boards.iter().all(|other: &Board| other.key() != board.key()) {
-            boards.push(board);
-        }
-    }
-    Ok(boards)
-}
-
-/// The first of the boards that the pictures show, and its corners in the rectified pictures.
-fn look_for(pairs: &[PairFiles], boards: &[Board]) -> Option<(Board, Vec<PairCorners>)> {
-    let find = |board: Board, pairs: &[PairFiles]| -> Vec<PairCorners> {
-        let bar = progress::bar("looking for the board", pairs.len() as u64);
-        let wanted = Wanted { board, needed: 1, mosaic: None, cache: None, overlays: None };
-        let look = |files: &PairFiles| {
-            bar.inc(1);
-            find_pair(files, &wanted).ok()
-        };
-        pairs.par_iter().filter_map(look).collect()
-    };
-    let (first, others) = pairs.split_at(pairs.len().min(FIRST_LOOKED_AT));
-    boards.iter().find_map(|&board| {
-        let mut found = find(board, first);
-        if found.is_empty() {
-            return None;
-        }
-        found.extend(find(board, others));
-        // Of a plain board that a rectified picture cuts, one picture alone does not tell which columns are missing.
-        let is_whole = |pair: &PairCorners| {
-            board.is_coded() || [&pair.left, &pair.right].iter().all(|corners| corners.len() == board.corner_count())
-        };
-        let whole: Vec<PairCorners> = found.iter().filter(|pair| is_whole(pair)).cloned().collect();
-        Some((board, if whole.is_empty() { found } else { whole }))
-    })
-}
-
-/// The pairs with how well their rows agree, and the one that agrees worst.
-fn judge(
-    mut file: RectifiedFile,
-    kept: Vec<(String, [String; 2])>,
-    found: Option<(Board, Vec<PairCorners>)>,
-) -> (RectifiedFile, Option<PairCorners>) {
-    let (board, found) = found.map_or((None, Vec::new()), |(board, found)| (Some(board), found));
-    let in_columns = file.common == Some("columns");
-    let differences = |pair: &PairCorners| -> Vec<f64> {
-        row_differences(pair, in_columns).into_iter().map(|(_, difference)| difference).collect()
-    };
-    let residual = |name: &str| row_residual(&differences(found.iter().find(|p| p.pair == name)?));
-    let pairs: Vec<RectifiedPair> = kept
-        .into_iter()
-        .map(|(pair, [left, right])| RectifiedPair { residual: residual(&pair), pair, left, right })
-        .collect();
-    let all: Vec<f64> = found.iter().flat_map(&differences).collect();
-    let worst = pairs
-        .iter()
-        .filter_map(|p| Some((p.residual?.rms_px, &p.pair)))
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .and_then(|(_, name)| found.iter().find(|p| p.pair == *name).cloned());
-    file.pairs = pairs;
-    match board {
-        Some(board) => (file.with_residual(board, row_residual(&all)), worst),
-        None => (file, None),
-    }
 }
 
 #[cfg(test)]
