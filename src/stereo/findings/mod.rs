@@ -10,6 +10,7 @@ pub mod common_misfit;
 pub mod hypothesis;
 mod one_side;
 mod other_rig;
+mod own_lenses;
 mod rolling_shutter;
 pub mod series;
 pub mod standing;
