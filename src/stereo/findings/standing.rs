@@ -261,13 +261,13 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     let further = self::change(&calibration, asked);
     if let Some(again) = further.as_ref().filter(|again| again.kind == Kind::Step && again.material(asked.tolerance_mm))
     {
-        let from = again.pairs.first().map_or("", String::as_str);
         change.cause = Cause::Unknown.word().to_owned();
         let fewest = fewest_pairs(asked.options.known.as_ref());
         change.remedy =
             hold(&change.cause, Some(&again.pairs).filter(|pairs| pairs.len() >= fewest).map(Vec::as_slice));
-        change.action =
-            format!("the rig goes on changing: {}, and again from pair {from} on ({})", change.action, again.action);
+        change.action = format!("the rig goes on changing: {}, and again {}", change.action, again.action);
+        // Lengths may be off by the larger of both.
+        change.effect_mm = again.effect_mm.into_iter().chain(change.effect_mm).reduce(f64::max);
         return None;
     }
     (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })

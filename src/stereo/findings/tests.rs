@@ -104,6 +104,23 @@ fn a_camera_that_zoomed() {
     }
 }
 
+/// An autofocus moves the picture, too: that is no camera that turned, and a knock is no focus.
+#[test]
+fn a_lens_that_was_focused_and_moved_its_picture() {
+    let world = World { sigma_px: 0.01, ..World::new(16, 7) };
+    let corners = planted(&world, 8, 8..16, |after| {
+        let right = &mut after.rig.right;
+        (right.fx, right.fy) = (right.fx * 1.006, right.fy * 1.006);
+        (right.cx, right.cy) = (right.cx + 1.5, right.cy - 1.0);
+    });
+    let (_, told) = standing(&corners);
+    assert!(told[0].cause.contains("focus") && told[0].action.contains("lens was focused otherwise"), "{told:?}");
+    let turn = Vector3::new(1e-3, -8e-4, 6e-4);
+    let knocked = world.with_camera_moved(turn, Vector3::new(0.3, -0.2, 0.1));
+    let (_, told) = standing(&shown_by(world.corners(8), &knocked, 8, 8..16));
+    assert!(!told[0].cause.contains("focus"), "{told:?}");
+}
+
 #[test]
 fn two_pairs_out_of_step() {
     for shift_mm in [2.0, 5.0] {

@@ -131,7 +131,7 @@ impl Looks<'_> {
         const NEARLY: f64 = 0.1;
         let difference = self.nearer();
         let limit = difference.limit(difference.off.len() - 2, self.chance());
-        let centre = |side: Side| [2, 3].map(|k| unit(difference.off.len(), self.layout.camera_start(side) + k));
+        let centre = |side: Side| hypothesis::centred(self.layout, side);
         let cut = |side: Side| Some((difference.left_by(&centre(side))?, side));
         let least = Side::BOTH.into_iter().filter_map(cut).min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((_, side)) = least.filter(|(left, _)| *left <= limit)
@@ -144,9 +144,4 @@ impl Looks<'_> {
         let nearest = nearest.filter(|(left, _)| *left < NEARLY * difference.chi_square()).map(|(_, i)| i);
         Explained::Nothing { nearest }
     }
-}
-
-/// The direction of one number.
-fn unit(count: usize, at: usize) -> DVector<f64> {
-    DVector::from_fn(count, |i, _| f64::from(i == at))
 }
