@@ -118,7 +118,7 @@ fn a_lens_that_was_focused_and_moved_its_picture() {
     let turn = Vector3::new(1e-3, -8e-4, 6e-4);
     let knocked = world.with_camera_moved(turn, Vector3::new(0.3, -0.2, 0.1));
     let (_, told) = standing(&shown_by(world.corners(8), &knocked, 8, 8..16));
-    assert!(!told[0].cause.contains("focus"), "{told:?}");
+    assert!(!told[0].action.contains("lens was focused otherwise"), "{told:?}");
 }
 
 #[test]
