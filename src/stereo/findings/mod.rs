@@ -185,7 +185,37 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     let pattern = significant(&linear, &hypotheses)?;
     let by_pair = pattern.by_pair.as_slice();
     let candidates = Candidate::all(&linear, &hypotheses, calibration, by_pair, pattern.kind == Kind::Step);
-    finding(calibration, lengths, &candidates, &pattern)
+    let equals = likeliest(&candidates, count);
+    let other = without_one(&linear, &hypotheses, calibration, &pattern, &equals);
+    finding(calibration, lengths, &equals, &pattern, other)
+}
+
+/// What a change would be without one of the pairs.
+struct WithoutOne {
+    pair: String,
+    words: String,
+    causes: Vec<Cause>,
+}
+
+/// The first pair that alone decides what a change is: without it other causes explain it, and none of these.
+fn without_one(
+    linear: &Linear,
+    hypotheses: &[Hypothesis],
+    calibration: &Calibration,
+    pattern: &Pattern,
+    equals: &[&Candidate],
+) -> Option<WithoutOne> {
+    let without = |pair: usize| {
+        let others = linear.without(pair)?;
+        let shares = pattern.by_pair.iter().enumerate().filter(|(i, _)| *i != pair);
+        let by_pair: Vec<f64> = shares.map(|(_, share)| *share).collect();
+        let candidates = Candidate::all(&others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
+        let now = likeliest(&candidates, others.pairs());
+        let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
+        let is_other = !now.is_empty() && equals.iter().all(|candidate| !causes.contains(&candidate.cause()));
+        is_other.then(|| WithoutOne { pair: calibration.views[pair].pair.clone(), words: described(&now), causes })
+    };
+    (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next()
 }
 
 /// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause by the F test, and, where
@@ -242,11 +272,11 @@ fn shuffled(count: usize, seed: usize) -> Vec<usize> {
 fn finding(
     calibration: &Calibration,
     lengths: &VolumeLengths,
-    candidates: &[Candidate],
+    equals: &[&Candidate],
     best: &Pattern,
+    other: Option<WithoutOne>,
 ) -> Option<Finding> {
     let count = calibration.views.len();
-    let equals = likeliest(candidates, count);
     let shown = *equals.first()?;
     let (whole, (size, unit)) = (shown.whole(), shown.size());
     let effect_mm = lengths.most_changed_mm(&calibration.layout, &whole);
@@ -255,13 +285,17 @@ fn finding(
         Kind::Step => format!("from pair {} on", name(best.first)),
         _ => format!("from pair {} to pair {}", name(0), name(count - 1)),
     };
-    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals));
+    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(equals));
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
-    let cause = Cause::words(equals.iter().map(|candidate| candidate.cause()));
+    if let Some(WithoutOne { pair, words, .. }) = &other {
+        action += &format!("; but pair {pair} alone decides what changed: without it, {words}");
+    }
+    let causes = equals.iter().map(|candidate| candidate.cause());
+    let cause = Cause::words(causes.chain(other.into_iter().flat_map(|other| other.causes)));
     let Change { common, gain, scatter, .. } = shown.change.clone();
     let along = Along { whole, common, by_pair: best.by_pair.clone(), gain, scatter };
     Some(Finding {
