@@ -112,8 +112,7 @@ fn surer(case: &Case, length: &VolumeLength) -> Cow<'static, str> {
     }
     let (left, _) = case.calibration.rig().project(&length.at_mm);
     let place = format!("at ({:.0}, {:.0}) px of the left picture, {:.0} mm away", left.x, left.y, length.at_mm.z);
-    format!("add pairs with the board where it is least certain, {place}, {}, and tilted otherwise", length.lies())
-        .into()
+    format!("add pairs with the board where lengths are least certain, {place}, {}", length.lies()).into()
 }
 
 /// What lengths that no board showed would be known to.
