@@ -107,11 +107,21 @@ impl Difference {
 
     /// The squared difference that is left where these directions may take what they like.
     pub fn left_by(&self, directions: &[DVector<f64>]) -> Option<f64> {
+        let (amounts, right) = self.taken(directions)?;
+        Some((self.chi_square() - right.dot(&amounts)).max(0.0))
+    }
+
+    /// What each of these directions takes then.
+    pub fn amounts(&self, directions: &[DVector<f64>]) -> Option<DVector<f64>> {
+        Some(self.taken(directions)?.0)
+    }
+
+    fn taken(&self, directions: &[DVector<f64>]) -> Option<(DVector<f64>, DVector<f64>)> {
         let weighted: Vec<DVector<f64>> = directions.iter().map(|d| self.joint.solve(d)).collect();
         let n = directions.len();
         let matrix = DMatrix::from_fn(n, n, |i, j| directions[i].dot(&weighted[j]));
         let right = DVector::from_fn(n, |i, _| weighted[i].dot(&self.off));
-        Some((self.chi_square() - right.dot(&matrix.cholesky()?.solve(&right))).max(0.0))
+        Some((matrix.cholesky()?.solve(&right), right))
     }
 
     /// Logarithm of the likelihood, but for a constant, of a change that leaves so much (the multivariate distribution of Student).

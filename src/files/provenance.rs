@@ -202,7 +202,7 @@ pub fn picture_hash(bytes: &[u8]) -> String {
 }
 
 /// Whether one of these pictures is one of those whose hashes a result holds.
-pub fn are_among(pictures: &BTreeSet<String>, paths: [&Utf8Path; 2]) -> bool {
+pub fn are_among<const N: usize>(pictures: &BTreeSet<String>, paths: [&Utf8Path; N]) -> bool {
     let is_among = |path| hash_of_picture(path).is_some_and(|hash| pictures.contains(&kept(&hash)));
     !pictures.is_empty() && paths.into_iter().any(is_among)
 }

@@ -54,9 +54,14 @@ impl Standing {
         if contradicted && self == Standing::StillValid { Standing::Undecided } else { self }
     }
 
-    /// What pairs say that contradict the calibration by themselves, and what they are off by, mm, where this standing is because of them.
+    /// What pairs say that contradict the calibration by themselves, and what they are off by, mm, where this standing is because of them or would hide
+    /// them.
     pub fn contradicted(self, recheck: &Recheck) -> Option<(String, f64)> {
-        recheck.contradiction().filter(|_| self == Standing::Undecided)
+        match self {
+            Standing::Undecided => recheck.contradiction(),
+            Standing::OwnData => recheck.contradiction_of_own(),
+            _ => None,
+        }
     }
 
     /// With which status a check ends.

@@ -16,6 +16,7 @@ use crate::formats::camera_check;
 use crate::formats::lenses;
 use crate::imaging::board::SQUARES_MM;
 use crate::imaging::board::printed::Printed;
+use crate::imaging::image::{ENOUGH_QUALITY, jpeg_quality};
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
@@ -70,6 +71,9 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if args.lens.is_some() && judged.verdict != Verdict::Pass {
         let other = "leave `--lens` away: the lens is then the one that best predicts pairs it has not seen";
         judged.advice.insert(0, other.to_owned());
+    }
+    if judged.verdict != Verdict::Pass {
+        judged.advice.extend(pairing.as_ref().and_then(compressed));
     }
     calibration.rig().unusual().into_iter().chain(report::camera_check::blurred(&corners)).for_each(progress::warn);
 
@@ -254,6 +258,15 @@ fn corners(
             Err(config::Error::Invalid { problems: vec!["neither pictures nor --corners given".into()] }.into())
         }
     }
+}
+
+/// Pictures that were compressed so far that their corners are not where they were.
+fn compressed(pairing: &Pairing) -> Option<String> {
+    let quality =
+        pairing.pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).filter_map(|path| jpeg_quality(path)).min();
+    quality.filter(|quality| *quality < ENOUGH_QUALITY).map(|quality| {
+        format!("save the pictures as PNG, or as JPEG of quality {ENOUGH_QUALITY} and more: these are of quality {quality}, whose blocks move corners")
+    })
 }
 
 /// Hashes of the pictures that can be read.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use camino::Utf8Path;
+use camino::{Utf8Path, Utf8PathBuf};
 
 use super::super::{Outcome, Result};
 use super::squares::squares;
@@ -47,7 +47,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let corners = open_numbers::by_rig(corners, &calibrated.rig);
     corners.notes.iter().for_each(progress::note);
     let made_by = out.provenance();
-    let whole = made_by.as_ref().and_then(|run| run.shares(&file)).filter(|_| !own.left_out);
+    let whole = made_by.as_ref().and_then(|run| run.shares(&file)).filter(|_| !own.only_new);
     let said =
         |same| format!("{same} holds what this calibration was made of: only new pairs tell whether it still holds");
     let of_own = own.statements().into_iter().chain(whole.map(said));
@@ -86,20 +86,26 @@ fn other_size(calibrated: &Calibrated, corners: &Corners) -> Option<String> {
     })
 }
 
-/// Pairs that the calibration was made of, among those that are to say whether it still holds.
+/// Pairs of pictures that the calibration was made of, among those that are to say whether it still holds.
 #[derive(Default)]
 struct Own {
     pairs: Vec<String>,
+    /// Pairs of which one picture is the calibration's and the other is not.
+    half: Vec<String>,
     /// Pairs of the same two pictures as an earlier one: they tell nothing of their own.
     again: Vec<String>,
     /// How many pairs there were with them.
     of: usize,
     /// Whether the others are enough to judge by: then these are left out.
     left_out: bool,
+    /// The same of those of which only one picture is the calibration's.
+    half_left_out: bool,
+    /// Whether such pairs were left out, and none is left.
+    only_new: bool,
 }
 
 impl Own {
-    /// Takes the pairs of which a picture is one of the calibration's out where the others are enough.
+    /// Takes the pairs of which a picture is one of the calibration's out where the others are enough; those of which only one is where any others are.
     fn among(pairing: &mut Pairing, calibration: &Utf8Path) -> Own {
         let known = Provenance::pictures_of(calibration);
         let of = pairing.pairs.len();
@@ -107,24 +113,39 @@ impl Own {
         let is_first = |pair: &PairFiles| seen.insert([&pair.left, &pair.right].map(|path| hash_of_picture(path)));
         let (pairs, again): (Vec<PairFiles>, Vec<PairFiles>) = pairing.pairs.drain(..).partition(is_first);
         pairing.pairs = pairs;
-        let is_own = |pair: &PairFiles| are_among(&known, [&pair.left, &pair.right]);
-        let (own, others): (Vec<PairFiles>, Vec<PairFiles>) = pairing.pairs.iter().cloned().partition(is_own);
+        let is_known = |path: &&Utf8PathBuf| are_among(&known, [path.as_path()]);
+        let count = |pair: &PairFiles| [&pair.left, &pair.right].into_iter().filter(is_known).count();
+        let counted: Vec<(usize, PairFiles)> = pairing.pairs.drain(..).map(|pair| (count(&pair), pair)).collect();
+        let with = |known: usize| {
+            let of = counted.iter().filter(|(count, _)| *count == known);
+            of.map(|(_, pair)| pair.pair.clone()).collect::<Vec<String>>()
+        };
+        let [others, half, own] = [0, 1, 2].map(with);
         let left_out = !own.is_empty() && others.len() >= FEWEST_PAIRS;
-        if left_out {
-            pairing.pairs = others;
-        }
-        let names = |pairs: Vec<PairFiles>| pairs.into_iter().map(|pair| pair.pair).collect();
-        Own { pairs: names(own), again: names(again), of, left_out }
+        let whole = if left_out { others.len() } else { others.len() + own.len() };
+        let half_left_out = !half.is_empty() && whole >= FEWEST_PAIRS;
+        let stays = |(known, _): &(usize, PairFiles)| [true, !half_left_out, !left_out][*known];
+        pairing.pairs = counted.into_iter().filter(stays).map(|(_, pair)| pair).collect();
+        let none_left = |pairs: &[String], left_out: bool| left_out || pairs.is_empty();
+        let only_new = (left_out || half_left_out) && none_left(&own, left_out) && none_left(&half, half_left_out);
+        let again = again.into_iter().map(|pair| pair.pair).collect();
+        Own { pairs: own, half, again, of, left_out, half_left_out, only_new }
     }
 
     fn statements(&self) -> Vec<String> {
-        let said = |pairs: &[String], why: &str| {
+        let said = |pairs: &[String], left_out: bool, why: &str| {
             let are = if pairs.len() == 1 { "is" } else { "are" };
-            format!("{} of {} pairs {are} left out, {why}: {}", pairs.len(), self.of, named(pairs))
+            let out = if left_out { "left out" } else { "compared" };
+            format!("{} of {} pairs {are} {out}, {why}: {}", pairs.len(), self.of, named(pairs))
         };
-        let again = (!self.again.is_empty()).then(|| said(&self.again, "the same pictures as another pair's"));
-        let own = self.left_out.then(|| said(&self.pairs, "of which this calibration was made"));
-        again.into_iter().chain(own).collect()
+        let again = (!self.again.is_empty()).then(|| said(&self.again, true, "the same pictures as another pair's"));
+        let own = self.left_out.then(|| said(&self.pairs, true, "of which this calibration was made"));
+        let half = (!self.half.is_empty()).then(|| {
+            let why = "of which one picture is of those that this calibration was made of and the other is not (changed since, or another \
+                       pair's)";
+            said(&self.half, self.half_left_out, why)
+        });
+        again.into_iter().chain(own).chain(half).collect()
     }
 }
 
@@ -155,4 +176,59 @@ fn corners(
     let cache = Some(Cache { out, thumbnails: false });
     let wanted = Wanted { board, needed: FEWEST_PAIRS, mosaic: args.bayer, cache, overlays: None };
     Ok((find_corners(&pairing, &wanted)?, own))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::temporary_folder;
+
+    /// The pairs of these names that are compared with a calibration of pairs a, b and c, and what is said: each has the left and the right picture of
+    /// the letters behind it.
+    fn compared(pairs: &[&str]) -> (Vec<String>, Own) {
+        let (_keep, root) = temporary_folder();
+        let picture = |side: &str, content: char| {
+            let path = root.join(format!("{side}{content}.png"));
+            std::fs::write(&path, format!("{side}{content}")).unwrap();
+            path
+        };
+        let known = ["a", "b", "c"].into_iter().flat_map(|pair| ["left", "right"].map(|side| format!("{side}{pair}")));
+        let hashes: Vec<String> =
+            known.map(|content| crate::files::provenance::picture_hash(content.as_bytes())[..16].to_owned()).collect();
+        let input = serde_json::json!({"file": "", "sha256": "", "picture_hashes": hashes});
+        let made_of = serde_json::json!({"program": "", "date": "", "command": "", "inputs": [input], "outputs": []});
+        let calibration = root.join("calibration.json");
+        std::fs::write(&calibration, serde_json::json!({ "provenance": made_of }).to_string()).unwrap();
+        let pair = |name: &&str| {
+            let of: Vec<char> = name.chars().collect();
+            PairFiles { pair: (*name).to_owned(), left: picture("left", of[0]), right: picture("right", of[1]) }
+        };
+        let mut pairing = Pairing { pairs: pairs.iter().map(pair).collect(), ..Pairing::default() };
+        let own = Own::among(&mut pairing, &calibration);
+        (pairing.pairs.into_iter().map(|pair| pair.pair).collect(), own)
+    }
+
+    #[test]
+    fn a_pair_with_one_picture_of_the_calibration_is_neither_its_own_nor_new() {
+        let (left, own) = compared(&["aa", "bb", "cx"]);
+        assert!(left == ["aa", "bb"] && !own.only_new, "{left:?}");
+        let said = own.statements().join("; ");
+        assert!(
+            said.starts_with("1 of 3 pairs is left out, of which one picture is") && said.ends_with(": cx"),
+            "{said}"
+        );
+
+        let (left, own) = compared(&["aa", "bx", "yy", "zz"]);
+        assert!(left == ["yy", "zz"] && own.only_new, "{left:?}");
+        assert_eq!(own.statements().len(), 2);
+
+        // Where nothing else is there, they are compared, and said to be what they are.
+        let (left, own) = compared(&["ax", "by"]);
+        assert!(left == ["ax", "by"] && !own.only_new, "{left:?}");
+        let said = own.statements().join("; ");
+        assert!(said.starts_with("2 of 2 pairs are compared, of which one picture is"), "{said}");
+
+        let (left, own) = compared(&["xx", "yy"]);
+        assert!(left == ["xx", "yy"] && own.statements().is_empty() && !own.only_new, "{left:?}");
+    }
 }

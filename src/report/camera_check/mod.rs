@@ -139,9 +139,9 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
 fn ledger(judged: &Judged) -> Markup {
     // What stands among the things to do is not said again.
     let next = summary::next(judged);
-    let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&line.remedy) {
+    let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&line.remedy.as_ref()) {
         true => line.detail.clone(),
-        false => format!("{}. To do: {}", line.detail, on_this_page(line.remedy)),
+        false => format!("{}. To do: {}", line.detail, on_this_page(&line.remedy)),
     };
     let below: Vec<&Evidence> = judged.evidence.iter().filter(|line| line.allows != Verdict::Pass).collect();
     html! {

@@ -215,10 +215,11 @@ pub(super) fn next(judged: &Judged) -> Vec<&str> {
     let board = judged.print_scatter.iter().filter(move |_| !passes).map(|board| board.text.as_str());
     // Lenses that are not these cameras' spoil all other lines.
     let lenses = judged.evidence.iter().find(|line| line.what == KNOWN_LENSES && line.allows != Verdict::Pass);
-    let deciding = lenses.or(judged.deciding()).filter(|line| line.allows != Verdict::Pass && !is_explained(line));
-    let deciding = deciding.map(|line| line.remedy);
+    let decides = |line: &&Evidence| lenses.is_none() && line.allows != Verdict::Pass && !is_explained(line);
+    let deciding = judged.deciding().filter(decides).map(|line| line.remedy.as_ref());
+    let first = lenses.into_iter().map(|line| line.remedy.as_ref());
     let mut told: Vec<&str> =
-        happened.chain(changed).chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
+        first.chain(happened).chain(changed).chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
     told.extend(judged.advice.iter().map(String::as_str));
     let mut said = std::collections::BTreeSet::new();
     told.retain(|what| said.insert(*what));
@@ -316,5 +317,33 @@ pub(super) fn advice(judged: &Judged) -> String {
         Verdict::Fail => format!(
             "Do not rely on {sure} mm: the lengths, the pairs and the residuals below show where the errors are."
         ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imaging::Side;
+    use crate::stereo::calibrate::calibrate;
+    use crate::stereo::judge::ledger::Standards;
+    use crate::stereo::model::KnownLenses;
+    use crate::stereo::select::options::Options;
+    use crate::stereo::synthetic::{BROWN4, World, judged};
+
+    /// What is known of lenses that are others makes all other lines as they are.
+    #[test]
+    fn what_to_do_about_lenses_that_are_exchanged_comes_first() {
+        let world = World::new(8, 88);
+        let earlier = calibrate(&World::new(12, 188).corners(188), &BROWN4).unwrap();
+        let said = |known: KnownLenses| {
+            let found = calibrate(&world.corners(71), &Options { known: Some(known), ..Options::default() }).unwrap();
+            let judged = judged(&found, Vec::new(), Standards::default(), 0.01);
+            next(&judged).into_iter().map(str::to_owned).collect::<Vec<String>>()
+        };
+        let known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
+        let exchanged = said(known.exchanged());
+        assert!(exchanged[0].starts_with("exchange the folders of left and right"), "{exchanged:?}");
+        let as_they_are = said(known);
+        assert!(!as_they_are.iter().any(|what| what.contains("exchange")), "{as_they_are:?}");
     }
 }

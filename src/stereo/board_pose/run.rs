@@ -10,6 +10,7 @@ use crate::stereo::Rig;
 use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Series};
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
+use crate::stereo::board_pose::rig_change::elsewhere;
 use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{Changed, scaled};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
@@ -35,6 +36,9 @@ const GROSS_SHARE: f64 = 1e-3;
 /// Corners that miss the rig this many times as far as usual are looked at in pictures that are exchanged or the other way round.
 const UNUSUAL_MISFIT: f64 = 3.0;
 
+/// A size of the target is no cause where another place of the right camera leaves less than this share of what it leaves.
+const BY_PLACE: f64 = 0.5;
+
 /// The pictures of one pose.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Seen {
@@ -53,6 +57,8 @@ pub struct Knowledge {
     pub pair_excess: Option<f64>,
     /// How far the pair disagreed that did most, as chi-square of six numbers beside that, where it is known.
     pub farthest_pair: Option<f64>,
+    /// By how much the pair missed the rig that did most, px, where it is known.
+    pub farthest_px: Option<f64>,
     /// Where the boards were at the calibration, where that is known.
     pub volume: Option<Volume>,
     /// The target as drawn.
@@ -179,7 +185,10 @@ impl<'a> Run<'a> {
         let misfits = present.iter().filter_map(|&i| {
             left.fit(&found.bundle.views[i], found.values.poses[i].as_ref()?).map(|alone| alone.rms_px)
         });
-        if !better(median(misfits).unwrap_or(f64::INFINITY)) {
+        let with_pitch_px = median(misfits).unwrap_or(f64::INFINITY);
+        // Another place of the right camera, of which a size is one number, leaves as much where it is the size.
+        let elsewhere_px = || elsewhere::misfit_px(&self.known.rig, &found.bundle.views, &self.starts);
+        if !better(with_pitch_px) || elsewhere_px().is_some_and(|px| px < BY_PLACE * with_pitch_px) {
             return None;
         }
         let [amount, sigma] = stretch(&found);

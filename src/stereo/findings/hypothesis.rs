@@ -63,6 +63,12 @@ pub fn refocused(layout: &Layout, rig: &Rig, sides: &[Side], share: f64) -> DVec
     direction
 }
 
+/// The two directions in which the picture of a side may lie elsewhere, by a px each.
+pub fn centred(layout: &Layout, side: Side) -> [DVector<f64>; 2] {
+    let at = layout.camera_start(side) + 2;
+    [at, at + 1].map(|at| DVector::from_fn(layout.count(), |i, _| f64::from(i == at)))
+}
+
 /// The six directions of any other place of the right camera.
 pub fn any_place(layout: &Layout) -> Vec<DVector<f64>> {
     let at = layout.transform_start();

@@ -6,10 +6,12 @@
 //! counted. The largest finding is taken out and the rest is looked at again. What is done about a finding follows from its effect and
 //! not from how surely it is seen ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
 
+mod candidates;
 pub mod common_misfit;
 pub mod hypothesis;
 mod one_side;
 mod other_rig;
+mod own_lenses;
 mod rolling_shutter;
 pub mod series;
 pub mod standing;
@@ -24,9 +26,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use crate::difference::TOLD_APART;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::hypothesis::{Hypothesis, any_place};
+use crate::stereo::findings::candidates::{Candidate, described, likeliest};
+use crate::stereo::findings::hypothesis::Hypothesis;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
@@ -171,12 +173,6 @@ struct Pattern {
     by_pair: DVector<f64>,
 }
 
-/// A cause with the pattern that is looked at, and what it explains.
-struct Candidate<'a> {
-    hypothesis: Option<&'a Hypothesis>,
-    change: Change,
-}
-
 /// The change of the rig over the series that explains most, where there is one.
 pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Finding> {
     let problem = calibration.problem();
@@ -187,18 +183,39 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     let linear = Linear::new(&problem, &calibration.layout)?;
     let hypotheses = hypothesis::all(&calibration.layout, calibration.rig());
     let pattern = significant(&linear, &hypotheses)?;
-    let any = any_place(&calibration.layout);
     let by_pair = pattern.by_pair.as_slice();
-    let one = |h| {
-        Some(Candidate { hypothesis: Some(h), change: linear.change(std::slice::from_ref(&h.direction), by_pair)? })
+    let candidates = Candidate::all(&linear, &hypotheses, calibration, by_pair, pattern.kind == Kind::Step);
+    let equals = likeliest(&candidates, count);
+    let other = without_one(&linear, &hypotheses, calibration, &pattern, &equals);
+    finding(calibration, lengths, &equals, &pattern, other)
+}
+
+/// What a change would be without one of the pairs.
+struct WithoutOne {
+    pair: String,
+    words: String,
+    causes: Vec<Cause>,
+}
+
+/// The first pair that alone decides what a change is: without it other causes explain it, and none of these.
+fn without_one(
+    linear: &Linear,
+    hypotheses: &[Hypothesis],
+    calibration: &Calibration,
+    pattern: &Pattern,
+    equals: &[&Candidate],
+) -> Option<WithoutOne> {
+    let without = |pair: usize| {
+        let others = linear.without(pair)?;
+        let shares = pattern.by_pair.iter().enumerate().filter(|(i, _)| *i != pair);
+        let by_pair: Vec<f64> = shares.map(|(_, share)| *share).collect();
+        let candidates = Candidate::all(&others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
+        let now = likeliest(&candidates, others.pairs());
+        let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
+        let is_other = !now.is_empty() && equals.iter().all(|candidate| !causes.contains(&candidate.cause()));
+        is_other.then(|| WithoutOne { pair: calibration.views[pair].pair.clone(), words: described(&now), causes })
     };
-    let mut candidates: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
-    // Six numbers of a step need more pairs than they are; six that drift at once are no cause.
-    if pattern.kind == Kind::Step && count > any.len() + 2 {
-        let change = linear.change(&any, by_pair);
-        candidates.extend(change.map(|change| Candidate { hypothesis: None, change }));
-    }
-    finding(calibration, lengths, &candidates, &pattern, &any)
+    (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next()
 }
 
 /// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause by the F test, and, where
@@ -252,66 +269,33 @@ fn shuffled(count: usize, seed: usize) -> Vec<usize> {
     order
 }
 
-/// The candidates that are not told apart from the one that explains most, that one first.
-fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b Candidate<'a>> {
-    // The scatter of the one that explains most is what the others are judged by.
-    let scatter = candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0);
-    // Logarithm of the likelihood but for a constant, less what the numbers cost.
-    let evidence =
-        |c: &Candidate| 0.5 * c.change.gain / scatter - 0.5 * c.change.amounts.len() as f64 * (pairs as f64).ln();
-    let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
-    let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
-    equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
-    // A single number that does as well as all six of another place is what happened.
-    if equals.iter().any(|c| c.hypothesis.is_some()) {
-        equals.retain(|c| c.hypothesis.is_some());
-    }
-    equals
-}
-
-/// What happened and by how much, in words, for each cause that it may have been.
-fn described(equals: &[&Candidate], turned_deg: f64) -> String {
-    let by = |c: &&Candidate| {
-        let hypothesis = c.hypothesis?;
-        Some(format!("{} by {:.3} {}", hypothesis.words, c.change.amounts[0], hypothesis.unit))
-    };
-    let words: Vec<String> = equals.iter().filter_map(by).collect();
-    match words.is_empty() {
-        true => format!("the right camera stands and looks otherwise by {turned_deg:.3} deg"),
-        false => words.join(", or "),
-    }
-}
-
 fn finding(
     calibration: &Calibration,
     lengths: &VolumeLengths,
-    candidates: &[Candidate],
+    equals: &[&Candidate],
     best: &Pattern,
-    any: &[DVector<f64>],
+    other: Option<WithoutOne>,
 ) -> Option<Finding> {
     let count = calibration.views.len();
-    let equals = likeliest(candidates, count);
     let shown = *equals.first()?;
-    let amounts = &shown.change.amounts;
-    let whole = match shown.hypothesis {
-        Some(h) => &h.direction * amounts[0],
-        None => any.iter().zip(amounts.iter()).fold(DVector::zeros(any[0].len()), |sum, (d, a)| sum + d * *a),
-    };
-    let turned_deg = || whole.rows(calibration.layout.transform_start(), 3).norm().to_degrees();
-    let (size, unit) = shown.hypothesis.map_or_else(|| (turned_deg(), "deg"), |h| (amounts[0], h.unit));
+    let (whole, (size, unit)) = (shown.whole(), shown.size());
     let effect_mm = lengths.most_changed_mm(&calibration.layout, &whole);
     let name = |i: usize| calibration.views[i].pair.clone();
     let which = match best.kind {
         Kind::Step => format!("from pair {} on", name(best.first)),
         _ => format!("from pair {} to pair {}", name(0), name(count - 1)),
     };
-    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(&equals, size));
+    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(equals));
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
         action += &format!("; the rig is that of the middle of the series, at {at}");
     }
-    let cause = Cause::words(equals.iter().map(|c| c.hypothesis.map_or(Cause::CameraMoved, |h| h.cause)));
+    if let Some(WithoutOne { pair, words, .. }) = &other {
+        action += &format!("; but pair {pair} alone decides what changed: without it, {words}");
+    }
+    let causes = equals.iter().map(|candidate| candidate.cause());
+    let cause = Cause::words(causes.chain(other.into_iter().flat_map(|other| other.causes)));
     let Change { common, gain, scatter, .. } = shown.change.clone();
     let along = Along { whole, common, by_pair: best.by_pair.clone(), gain, scatter };
     Some(Finding {

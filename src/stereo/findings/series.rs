@@ -67,6 +67,8 @@ pub struct Linear {
     matrices: Vec<DMatrix<f64>>,
     gradients: Vec<DVector<f64>>,
     inverse: DMatrix<f64>,
+    /// What all pairs and what is expected say of the shared numbers.
+    sum: DMatrix<f64>,
     /// Where each board stood, in units of the boards' spread; a column each.
     places: Vec<[f64; 3]>,
 }
@@ -94,7 +96,25 @@ impl Linear {
         let [means, spreads] = [[0, 1, 2].map(mean), [0, 1, 2].map(spread)];
         let unit = |c: &[f64; 3]| [0, 1, 2].map(|k| (c[k] - means[k]) / spreads[k].max(f64::MIN_POSITIVE));
         let places = centres.iter().map(unit).collect();
-        Some(Linear { matrices, gradients, inverse, places })
+        Some(Linear { matrices, gradients, inverse, sum, places })
+    }
+
+    /// The same without a pair, at the minimum of the others. `None` where these do not determine the shared numbers.
+    pub fn without(&self, pair: usize) -> Option<Linear> {
+        let (known, all) = (self.sum.nrows(), self.inverse.nrows());
+        let sum = &self.sum - self.matrices[pair].view((0, 0), (known, known));
+        let mut inverse = DMatrix::zeros(all, all);
+        inverse.view_mut((0, 0), (known, known)).copy_from(&invert(&sum)?);
+        // At the minimum of all pairs the others pull by as much as this one, the other way.
+        let step = &inverse * &self.gradients[pair];
+        let others = || (0..self.pairs()).filter(|i| *i != pair);
+        Some(Linear {
+            matrices: others().map(|i| self.matrices[i].clone()).collect(),
+            gradients: others().map(|i| &self.gradients[i] + &self.matrices[i] * &step).collect(),
+            places: others().map(|i| self.places[i]).collect(),
+            inverse,
+            sum,
+        })
     }
 
     pub fn pairs(&self) -> usize {
@@ -194,5 +214,39 @@ impl Linear {
         }
         let freedom = (directions.len() * self.pairs().saturating_sub(2)).max(1) as f64;
         squares / freedom
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::stereo::calibrate::calibrate;
+    use crate::stereo::findings::hypothesis::turned;
+    use crate::stereo::synthetic::{BROWN4, World};
+
+    /// A pair that is left out in the linear problem is as one that was not there.
+    #[test]
+    fn without_a_pair_the_others_say_what_they_say_by_themselves() {
+        let world = World { sigma_px: 0.01, ..World::new(10, 31) };
+        let mut corners = world.corners(31);
+        let after = world.with_camera_moved(Vector3::y() * 1e-4, Vector3::zeros()).corners(31);
+        (5..10).for_each(|i| corners.pairs[i] = after.pairs[i].clone());
+        let found = calibrate(&corners, &BROWN4).unwrap();
+        let (problem, layout) = (found.problem(), found.layout);
+        let yaw = [turned(&layout, found.rig(), Vector3::y())];
+        let by_pair: Vec<f64> = (0..9).map(|i| f64::from(i >= 5)).collect();
+        let mut others = problem.clone();
+        others.views.remove(7);
+        others.values.poses.remove(7);
+        others.values = others.refit(&layout).unwrap();
+        let linear = Linear::new(&problem, &layout).unwrap();
+        let [left_out, by_themselves] = [linear.without(7).unwrap(), Linear::new(&others, &layout).unwrap()]
+            .map(|linear| linear.change(&yaw, &by_pair).unwrap());
+        let all: Vec<f64> = (0..10).map(|i| f64::from(i >= 5)).collect();
+        let all = linear.change(&yaw, &all).unwrap();
+        let off = |change: &Change| (change.gain / by_themselves.gain - 1.0).abs();
+        assert!(off(&left_out) < 0.02 && off(&left_out) < 0.3 * off(&all), "{left_out:?} {by_themselves:?}");
     }
 }

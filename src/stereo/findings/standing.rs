@@ -13,7 +13,7 @@ use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
 use crate::stereo::error::BY_SINCE;
 use crate::stereo::findings::{
-    self, Finding, Kind, common_misfit, hold, one_side, other_rig, rolling_shutter, without_drift,
+    self, Finding, Kind, common_misfit, hold, one_side, other_rig, own_lenses, rolling_shutter, without_drift,
 };
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -41,13 +41,15 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
     let fitting = |corners: &Corners| standing(corners, asked).ok().map(|(found, _)| found.views.len());
     let (mut found, mut told) = standing(corners, asked).map_err(|error| one_side::explain(error, corners, fitting))?;
     let of_rig = |found: &Calibration| lengths(found, asked.extent);
-    match rolling_shutter::look(&found, of_rig) {
+    let with_own = own_lenses::instead_of_contradicted(&found);
+    let asked_of = with_own.as_ref().unwrap_or(&found);
+    match rolling_shutter::look(asked_of, of_rig) {
         // Of corners that were moved back by a drift nothing more is asked.
         Some((rolling, step)) if found.since_moment.is_empty() && rolling.material(asked.tolerance_mm) => {
             allow_for(&mut found, &[step]);
             told.push(rolling);
         }
-        _ => told.extend(common_misfit::look(&found, &told)),
+        _ => told.extend(common_misfit::look(asked_of, &told)),
     }
     Ok((found, told))
 }
@@ -266,13 +268,13 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     let further = self::change(&calibration, asked);
     if let Some(again) = further.as_ref().filter(|again| again.kind == Kind::Step && again.material(asked.tolerance_mm))
     {
-        let from = again.pairs.first().map_or("", String::as_str);
         change.cause = Cause::Unknown.word().to_owned();
         let fewest = fewest_pairs(asked.options.known.as_ref());
         change.remedy =
             hold(&change.cause, Some(&again.pairs).filter(|pairs| pairs.len() >= fewest).map(Vec::as_slice));
-        change.action =
-            format!("the rig goes on changing: {}, and again from pair {from} on ({})", change.action, again.action);
+        change.action = format!("the rig goes on changing: {}, and again {}", change.action, again.action);
+        // Lengths may be off by the larger of both.
+        change.effect_mm = again.effect_mm.into_iter().chain(change.effect_mm).reduce(f64::max);
         return None;
     }
     (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })

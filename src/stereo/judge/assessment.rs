@@ -11,6 +11,7 @@ use crate::stereo::judge::residual_correlation;
 use crate::stereo::judge::verdict::{Expansion, Verdict};
 use crate::stereo::judge::view_coverage::Coverage;
 use crate::stereo::pairs::Cause;
+use crate::stereo::solve::priors::BOW_SHARE;
 use crate::stereo::volume::Extent;
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -81,7 +82,10 @@ impl Judged {
         let print_scatter = if other_board { None } else { print_scatter(calibration, &facts) };
         warnings.extend(print_scatter.clone());
         let verdict = evidence.iter().fold(Verdict::Pass, |verdict, line| verdict.and(line.allows));
-        let advice = facts.coverage.advice();
+        let advice = match verdict {
+            Verdict::Pass => facts.coverage.advice(),
+            _ => bent(calibration).into_iter().chain(facts.coverage.advice()).collect(),
+        };
         Judged { facts, verdict, evidence, print_scatter, advice, warnings }
     }
 
@@ -125,6 +129,18 @@ impl Judged {
         let largest = |a, b| if of(b) > of(a) { b } else { a };
         if free && lengths.iter().all(known) { lengths.into_iter().reduce(largest) } else { None }
     }
+}
+
+/// Asks for another board where this one is bent by more than boards are: what a bow leaves beside the paraboloid that is fitted is in all lengths.
+fn bent(calibration: &Calibration) -> Option<String> {
+    let [along_x, along_y, twist] = calibration.values.shared.shape_mm.map(f64::abs);
+    let most = BOW_SHARE * calibration.board.diagonal_mm();
+    (calibration.layout.shape && along_x.max(along_y).max(twist) > most).then(|| {
+        format!(
+            "the board is bowed by {along_x:.2} mm along x and {along_y:.2} mm along y, and twisted by {twist:.2} mm: glue it to a flat plate (glass, \
+             aluminium), and photograph again"
+        )
+    })
 }
 
 /// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same deviations.

@@ -1,5 +1,7 @@
 //! One fact that speaks for or against a rig: its figure, its limit with the reason, and the best verdict that it allows.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use crate::diagnostic::{Warning, at_most, two_digits};
@@ -21,7 +23,7 @@ pub struct Evidence {
     /// What it means, with the reason of the limit.
     pub detail: String,
     /// What to do where it does not allow a pass; empty where it always does.
-    pub remedy: &'static str,
+    pub remedy: Cow<'static, str>,
 }
 
 /// A figure with the digits that count: four decimals below one, none for whole numbers.

@@ -5,6 +5,7 @@ use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use crate::geometry::transform;
 use crate::imaging::{Corner, Corners};
 use crate::simulate::draws::{Draws, Purpose};
+use crate::stereo::calibrate::calibrate;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::ledger::{Case, Standards, ledger};
@@ -273,7 +274,7 @@ fn where_one_pair_alone_reaches_the_border_more_are_asked_for_there() {
         *largest = LengthError { pair, error_mm, calibration_mm: 5.0, ..*largest };
         facts.coverage.lenses_known = lenses_known;
         let lines = ledger(&Case { calibration: &found, facts: &facts });
-        lines.iter().find(|line| line.what == "held-out lengths").unwrap().remedy
+        lines.iter().find(|line| line.what == "held-out lengths").unwrap().remedy.clone()
     };
     let asks = "add pairs with the board at the right border";
     assert!(remedy(border, 1.0, false).starts_with(asks), "{}", remedy(border, 1.0, false));
@@ -282,4 +283,41 @@ fn where_one_pair_alone_reaches_the_border_more_are_asked_for_there() {
         let remedy = remedy(pair, error_mm, lenses_known);
         assert!(remedy.starts_with("look at the worst pair"), "{pair} {error_mm} {lenses_known}: {remedy}");
     }
+}
+
+#[test]
+fn more_pairs_are_asked_for_where_the_board_is_least_certain_and_only_where_they_help() {
+    let found = calibrate(&World::new(8, 73).corners(73), &Options::default()).unwrap();
+    let Judged { facts, .. } = synthetic::judged(&found, Vec::new(), Standards::default(), TOLERANCE_MM);
+    let remedy = |corners_mm: f64, calibration_mm: f64| {
+        let mut facts = facts.clone();
+        for length in &mut facts.volume.lengths {
+            (length.corners_mm, length.calibration_mm) = (corners_mm, calibration_mm);
+        }
+        let lines = ledger(&Case { calibration: &found, facts: &facts });
+        lines.iter().find(|line| line.what == "any length in the volume").unwrap().remedy.to_string()
+    };
+    let of_calibration = remedy(0.01 * TOLERANCE_MM, 10.0 * TOLERANCE_MM);
+    assert!(
+        of_calibration.contains("add pairs") && of_calibration.contains("px of the left picture"),
+        "{of_calibration}"
+    );
+    let of_corners = remedy(TOLERANCE_MM, 10.0 * TOLERANCE_MM);
+    assert!(of_corners.contains("no more pairs change that"), "{of_corners}");
+}
+
+#[test]
+fn a_board_that_is_far_from_flat_is_asked_for_another_where_the_rig_does_not_pass() {
+    let asked = |bow_mm: f64, tolerance_mm: f64| {
+        let world = World { bow_mm: [bow_mm, 0.5 * bow_mm], ..World::new(14, 74) };
+        let bowed = Options { shape: Some(true), ..Options::default() };
+        let found = calibrate(&world.corners(74), &bowed).unwrap();
+        let judged = synthetic::judged(&found, Vec::new(), Standards::default(), tolerance_mm);
+        let asks = judged.advice.iter().any(|what| what.starts_with("the board is bowed by"));
+        (judged.verdict == Verdict::Pass, asks)
+    };
+    assert_eq!(asked(2.0, 1e-3), (false, true));
+    assert_eq!(asked(0.1, 1e-3), (false, false));
+    let (passes, asks) = asked(2.0, 5.0);
+    assert_eq!(passes, !asks);
 }

@@ -8,19 +8,21 @@
 //! is seen in nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
 //! see a focus; that is what the stated figures say.
 
+mod looks;
 mod strays;
 #[cfg(test)]
 mod tests;
 
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
+use self::looks::Looks;
+pub use self::looks::{CauseSeen, Explained};
 pub use self::strays::Stray;
-use crate::difference::{Difference, SEEN, TOLD_APART};
+use crate::difference::Difference;
 use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
 use crate::stereo::data::{Noise, View, in_use};
-use crate::stereo::findings::hypothesis::{self, Hypothesis};
+use crate::stereo::findings::hypothesis;
 use crate::stereo::init::board_pose::{self, misfit_px};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::rig::Rig;
@@ -33,9 +35,6 @@ use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::volume::Volume;
 use crate::stereo::volume::lengths::{VolumeLengths, long_mm};
-
-/// Chance that a rig that did not change is said to have changed.
-const FALSE_ALARM: f64 = 0.01;
 
 /// Causes that a line names; the table has all.
 const TOLD: usize = 3;
@@ -57,37 +56,6 @@ pub struct Before {
     pub pairs: Option<usize>,
     /// The volume that it was checked for; that of the new boards where its file does not say.
     pub volume: Option<Volume>,
-}
-
-/// What the pairs say of one cause.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CauseSeen {
-    pub cause: Cause,
-    /// For a person: what would have changed.
-    #[serde(rename = "what")]
-    pub words: String,
-    /// By how much it changed, if it alone did, with its standard deviation.
-    pub amount: f64,
-    /// In the unit of both.
-    pub sigma: f64,
-    pub unit: &'static str,
-    /// By how much that moves a length, mm.
-    pub effect_mm: f64,
-    /// The smallest change that nineteen of twenty such tests see.
-    pub seen: f64,
-    /// By how much that one moves a length, mm.
-    pub seen_mm: f64,
-}
-
-/// What explains a change.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Explained {
-    /// Causes of one number each that are not told apart, the likeliest first, as places in the list of all.
-    Causes(Vec<usize>),
-    /// The right camera stands and looks otherwise, in more than one way.
-    Moved,
-    /// None of them.
-    Nothing,
 }
 
 /// What is said of the rig.
@@ -244,86 +212,6 @@ impl Before {
     }
 }
 
-/// All looks at a difference: whether something changed, and what.
-struct Looks<'a> {
-    /// To the rig that the pairs give by themselves.
-    own: &'a Difference,
-    /// The same from the old rig on; see [`step_from_old`].
-    from_old: Option<&'a Difference>,
-    layout: &'a Layout,
-    hypotheses: &'a [Hypothesis],
-    corners: usize,
-}
-
-impl Looks<'_> {
-    /// Chance of a false alarm in one of all looks: every cause, and all numbers together.
-    fn chance(&self) -> f64 {
-        FALSE_ALARM / (self.hypotheses.len() + 1) as f64
-    }
-
-    /// The difference that tells sizes and causes: that to the pairs' own rig, unless a few pairs that contradict each other have led it away.
-    fn nearer(&self) -> &Difference {
-        const SEVERAL: f64 = 4.0;
-        let led_away = |old: &&Difference| self.own.chi_square() > SEVERAL * old.chi_square();
-        self.from_old.filter(led_away).unwrap_or(self.own)
-    }
-
-    fn of_cause(&self, h: &Hypothesis, moves: &impl Fn(&DVector<f64>) -> f64) -> Option<CauseSeen> {
-        let difference = self.nearer();
-        let (amount, sigma) = difference.along(&h.direction)?;
-        let unit_mm = moves(&h.direction);
-        let seen = (difference.level(self.chance()) + SEEN) * sigma;
-        Some(CauseSeen {
-            cause: h.cause,
-            words: h.words.to_owned(),
-            amount,
-            sigma,
-            unit: h.unit,
-            effect_mm: unit_mm * amount.abs(),
-            seen,
-            seen_mm: unit_mm * seen,
-        })
-    }
-
-    /// A change is one from either rig on.
-    fn is_change(&self) -> bool {
-        std::iter::once(self.own).chain(self.from_old).all(|difference| self.differs(difference))
-    }
-
-    fn differs(&self, difference: &Difference) -> bool {
-        let chance = self.chance();
-        let level = difference.level(chance);
-        let alone = |h: &Hypothesis| difference.along(&h.direction).is_some_and(|(a, sigma)| a.abs() > level * sigma);
-        difference.chi_square() > difference.limit(difference.off.len(), chance) || self.hypotheses.iter().any(alone)
-    }
-
-    /// What explains the change: causes that leave no more than chance and are not told apart, the likeliest first; or another place of the
-    /// right camera in all six numbers, where that alone leaves no more than chance or does better by more than its numbers cost.
-    fn explained(&self) -> Explained {
-        let (difference, hypotheses) = (self.nearer(), self.hypotheses);
-        let count = difference.off.len();
-        let within = |left: f64, freed: usize| left <= difference.limit(count - freed, self.chance());
-        let left = |i: usize| Some((difference.left_by(std::slice::from_ref(&hypotheses[i].direction))?, i));
-        let mut explain: Vec<(f64, usize)> = (0..hypotheses.len()).filter_map(left).collect();
-        explain.retain(|(left, _)| within(*left, 1));
-        explain.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let place = hypothesis::any_place(self.layout);
-        let by_place = difference.left_by(&place).filter(|left| within(*left, place.len()));
-        let Some(best) = explain.first().map(|(left, _)| *left) else {
-            return by_place.map_or(Explained::Nothing, |_| Explained::Moved);
-        };
-        let cost = 0.5 * (place.len() - 1) as f64 * (self.corners.max(2) as f64).ln();
-        if by_place
-            .is_some_and(|left| difference.log_likelihood(left) - difference.log_likelihood(best) - cost > TOLD_APART)
-        {
-            return Explained::Moved;
-        }
-        let less_likely = |left: f64| difference.log_likelihood(best) - difference.log_likelihood(left);
-        let near = explain.into_iter().filter(|(left, _)| less_likely(*left) < TOLD_APART);
-        Explained::Causes(near.map(|(_, i)| i).collect())
-    }
-}
-
 impl Recheck {
     /// The causes that explain the change, the likeliest first.
     pub fn likeliest(&self) -> Vec<&CauseSeen> {
@@ -338,7 +226,7 @@ impl Recheck {
         match &self.change {
             None => String::new(),
             Some(Explained::Moved) => Cause::CameraMoved.word().to_owned(),
-            Some(Explained::Nothing) => Cause::Unknown.word().to_owned(),
+            Some(Explained::Cut { .. } | Explained::Nothing { .. }) => Cause::Unknown.word().to_owned(),
             Some(Explained::Causes(_)) => Cause::words(self.likeliest().iter().map(|cause| cause.cause)),
         }
     }
@@ -349,13 +237,30 @@ impl Recheck {
         (!self.strays.is_empty()).then(said)
     }
 
+    /// The same where the calibration was made of these pairs: the rig is not what changed since.
+    pub fn contradiction_of_own(&self) -> Option<(String, f64)> {
+        let (_, off_mm) = self.contradiction()?;
+        let said = strays::contradicting(&self.strays, self.length_mm);
+        let others = "the calibration was made of these pairs, and the others agree with it whatever happened since";
+        Some((format!("{said}; {others}"), off_mm))
+    }
+
     /// What changed, for a person.
     pub fn statement(&self) -> String {
         let of = |c: &CauseSeen| format!("{} by {:.4} {} (+- {:.4})", c.words, c.amount, c.unit, 2.0 * c.sigma);
         match &self.change {
             None => "no change beyond chance".to_owned(),
             Some(Explained::Moved) => "the right camera stands and looks otherwise, in more than one way".to_owned(),
-            Some(Explained::Nothing) => "the rig changed, and no single cause explains how".to_owned(),
+            Some(Explained::Cut { side, by_px: [x, y] }) => format!(
+                "the {} camera's pictures show everything {x:+.2} px across and {y:+.2} px down from where they had it: they are cut or padded otherwise, or \
+                 moved by what steadies them",
+                side.name()
+            ),
+            Some(Explained::Nothing { nearest }) => {
+                let nearest = nearest.map(|at| of(&self.causes[at]));
+                let most = nearest.map_or(String::new(), |cause| format!("; nearest to it comes that {cause}"));
+                format!("the rig changed, and no single cause explains how{most}")
+            }
             Some(Explained::Causes(_)) => {
                 let likeliest = self.likeliest();
                 let more = likeliest.len().saturating_sub(TOLD);

@@ -50,13 +50,21 @@ fn rig_of(problem: &Problem, pair: usize) -> Rig {
     alone.search(&PLACE, Loss::Squared, Search::TRIAL).values.shared.rig
 }
 
-/// What strays among the pairs mean, for a person, where no common change says it.
-pub fn statement(strays: &[Stray], pairs: &[String], length_mm: f64) -> String {
-    let names: Vec<String> = strays.iter().map(|stray| stray.pair.clone()).collect();
+fn names(strays: &[Stray]) -> Vec<String> {
+    strays.iter().map(|stray| stray.pair.clone()).collect()
+}
+
+/// Which strays there are, and by how much.
+pub fn contradicting(strays: &[Stray], length_mm: f64) -> String {
+    let names = names(strays);
     let (noun, verb) = if names.len() == 1 { ("pair", "contradicts") } else { ("pairs", "contradict") };
     let effect_mm = two_digits(largest_mm(strays));
-    let said =
-        format!("{noun} {} {verb} the calibration (a length of {length_mm} mm by up to {effect_mm} mm)", named(&names));
+    format!("{noun} {} {verb} the calibration (a length of {length_mm} mm by up to {effect_mm} mm)", named(&names))
+}
+
+/// What strays among the pairs mean, for a person, where no common change says it.
+pub fn statement(strays: &[Stray], pairs: &[String], length_mm: f64) -> String {
+    let (names, said) = (names(strays), contradicting(strays, length_mm));
     match (names.len() == pairs.len(), pairs.ends_with(&names)) {
         (true, _) => {
             "every pair contradicts the calibration, and no common change explains how: pictures that are turned, exchanged or not taken at one \

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::geometry::transform;
+use crate::stereo::Side;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::select::options::Options;
@@ -79,6 +80,9 @@ fn a_pair_that_contradicts_the_others_is_named() {
         assert!((effect_mm - true_mm).abs() < within_mm, "{turn_deg} deg: {effect_mm} mm, the truth is {true_mm}");
         let (said, off_mm) = found.contradiction().unwrap();
         assert!(said.contains("contradicts the calibration") && off_mm == effect_mm, "{said}: {off_mm} mm");
+        // Of pictures that the calibration was made of the rig is not what changed since.
+        let (said, _) = found.contradiction_of_own().unwrap();
+        assert!(said.contains("contradicts the calibration") && !said.contains("the rig moved"), "{said}");
     }
 }
 
@@ -181,6 +185,27 @@ fn a_knock_in_all_six_numbers_has_no_name_of_one() {
     .unwrap();
     assert!(knocked.effect_mm > 0.05, "{knocked:?}");
     assert_eq!(knocked.cause(), "camera-moved", "{}", knocked.statement());
+}
+
+#[test]
+fn pictures_that_are_cut_otherwise_are_no_camera_that_turned() {
+    let before = calibrated(43);
+    let cut = |side: Side| {
+        let mut corners = after(43, |_| {});
+        for pair in &mut corners.pairs {
+            let list = if side == Side::Left { &mut pair.left } else { &mut pair.right };
+            list.iter_mut().for_each(|corner| (corner.px.x, corner.px.y) = (corner.px.x + 60.0, corner.px.y - 35.0));
+        }
+        recheck(&before, &corners).unwrap()
+    };
+    for side in Side::BOTH {
+        let found = cut(side);
+        let Some(Explained::Cut { side: of, by_px: [x, y] }) = found.change else { panic!("{}", found.statement()) };
+        assert!(of == side && (x - 60.0).abs() < 6.0 && (y + 35.0).abs() < 6.0, "{}", found.statement());
+        assert!(found.effect_mm > 0.05 && found.cause() == "unknown", "{}", found.statement());
+    }
+    let found = recheck(&before, &after(43, |rig| turned(rig, 1.0))).unwrap();
+    assert!(found.cause().contains("yaw"), "{}", found.statement());
 }
 
 #[test]

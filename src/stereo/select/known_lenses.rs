@@ -57,7 +57,8 @@ impl LensCheck {
     pub fn remedy(&self) -> &'static str {
         match self.causes.as_slice() {
             [Cause::Exchanged] => {
-                "give each lens to the other camera: `--intrinsics FILE,left` and `--intrinsics FILE,right`"
+                "exchange the folders of left and right; or, where each lens has a file of its own, the sides of the files: `--intrinsics LEFT,right` and \
+                 `--intrinsics RIGHT,left`"
             }
             _ => "give the lenses as they are now, or leave `--intrinsics` out and photograph more pairs",
         }

@@ -35,7 +35,7 @@ const NOT_SQUARE: f64 = 0.03;
 const ALIKE: f64 = 0.01;
 const TWO_MAKES: f64 = 0.05;
 /// By how much a board bends, as a share of its diagonal.
-const BOW_SHARE: f64 = 0.003;
+pub const BOW_SHARE: f64 = 0.003;
 
 /// A sum of shared numbers that is expected to have some value.
 #[derive(Debug, Clone, PartialEq)]

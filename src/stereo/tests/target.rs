@@ -18,6 +18,7 @@ fn known(rig: &Rig, board: Board) -> Knowledge {
         noise: None,
         pair_excess: None,
         farthest_pair: None,
+        farthest_px: None,
         volume: None,
         board,
         crossing_mm: 0.01,
@@ -110,6 +111,26 @@ fn a_rig_that_is_scaled_is_not_taken_for_a_larger_target() {
         let is_told = judgement.ends_the_run() || judgement.leaves_open(tolerance_mm);
         assert_eq!(is_told, share > 0.0, "{share}: {judgement:?}");
     }
+}
+
+/// Cameras side by side, boards from near to far: a right camera that turned makes all boards seem larger, the far ones more so.
+#[test]
+fn a_camera_that_turned_is_not_told_as_a_target_of_another_size() {
+    let mut world = World::facing(12, |i| Vector3::new(0.3 * (2.0 * i).sin(), 0.3 * (1.3 * i).cos(), 0.1 * i.sin()));
+    for (i, pose) in world.poses.iter_mut().enumerate() {
+        pose.translation.vector.z = 480.0 + 20.0 * i as f64;
+    }
+    let sizes = |world: &World, board: Board| {
+        let measured =
+            series::measure(&known(&World::facing(1, |_| Vector3::zeros()).rig, board), run_of(world.corners(3)));
+        let (Judgement::Allowed(changed) | Judgement::Contradicts(changed)) = measured.judgement else { return false };
+        changed.explanations.iter().any(|e| e.cause == Cause::Pitch)
+    };
+    let turned = world.with_camera_moved(Vector3::y() * 0.5_f64.to_radians(), Vector3::zeros());
+    assert!(!sizes(&turned, world.board));
+    let mut larger = world.board;
+    larger.square_mm *= 1.13;
+    assert!(sizes(&world, larger));
 }
 
 /// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one that does much more is named.

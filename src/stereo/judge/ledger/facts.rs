@@ -1,5 +1,7 @@
 //! What the lines of the ledger are made of.
 
+use std::borrow::Cow;
+
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::Finding;
 use crate::stereo::judge::evidence::Evidence;
@@ -76,26 +78,34 @@ impl Evidence {
     /// A length that is held against the tolerance, mm; without one nothing can be said.
     pub(super) fn of_length(
         what: &'static str,
-        remedy: &'static str,
+        remedy: impl Into<Cow<'static, str>>,
         value_mm: Option<f64>,
         case: &Case,
         detail: String,
     ) -> Evidence {
         let allows = Verdict::within(value_mm.unwrap_or(f64::NAN), case.facts.tolerance_mm);
-        Evidence { what, remedy, value: value_mm, limit: Some(case.facts.tolerance_mm), unit: "mm", allows, detail }
+        Evidence {
+            what,
+            remedy: remedy.into(),
+            value: value_mm,
+            limit: Some(case.facts.tolerance_mm),
+            unit: "mm",
+            allows,
+            detail,
+        }
     }
 
     /// A figure beside its limit, which casts doubt on a rig where it is not kept.
     pub(super) fn of_doubt(
         what: &'static str,
-        remedy: &'static str,
+        remedy: impl Into<Cow<'static, str>>,
         [value, limit]: [f64; 2],
         unit: &'static str,
         is_kept: bool,
         detail: String,
     ) -> Evidence {
         let allows = if is_kept { Verdict::Pass } else { Verdict::Undecided };
-        Evidence { what, remedy, value: Some(value), limit: Some(limit), unit, allows, detail }
+        Evidence { what, remedy: remedy.into(), value: Some(value), limit: Some(limit), unit, allows, detail }
     }
 }
 

@@ -1,15 +1,18 @@
 //! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on what residuals, rays and
 //! epipolar lines say of them.
 
+use std::borrow::Cow;
+
 use super::facts::{Case, Facts};
 use crate::diagnostic::{summed, two_digits};
 use crate::statistics::median;
 use crate::stereo::judge::doubtful_corners::CONTRADICTED;
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::lengths::model_disagreement;
-use crate::stereo::judge::verdict::{LengthError, Verdict};
+use crate::stereo::judge::verdict::{COVERAGE, LengthError, Verdict};
 use crate::stereo::judge::view_coverage;
 use crate::stereo::volume::Extent;
+use crate::stereo::volume::lengths::VolumeLength;
 
 pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     let extremes = &case.facts.accuracy.extremes;
@@ -95,13 +98,21 @@ pub(super) fn any_length(case: &Case) -> Evidence {
             unseen(case)
         ),
     };
-    Evidence::of_length(
-        "any length in the volume",
-        "add pairs with the board where it is least certain, and tilted",
-        value,
-        case,
-        detail,
-    )
+    let remedy = worst
+        .map_or(Cow::Borrowed("add pairs with the board elsewhere, and tilted"), |(_, length)| surer(case, length));
+    Evidence::of_length("any length in the volume", remedy, value, case, detail)
+}
+
+/// What makes the length that is known least known better: pairs where it lies, unless what the corners at its ends scatter by is too much already.
+fn surer(case: &Case, length: &VolumeLength) -> Cow<'static, str> {
+    if COVERAGE * length.corners_mm > case.facts.tolerance_mm {
+        return "what corners scatter by is more than the tolerance where lengths are least certain, and no more pairs change that: a flat board on a stand, \
+                sharper pictures, both cameras triggered at once, cameras farther apart, or a board that is nearer"
+            .into();
+    }
+    let (left, _) = case.calibration.rig().project(&length.at_mm);
+    let place = format!("at ({:.0}, {:.0}) px of the left picture, {:.0} mm away", left.x, left.y, length.at_mm.z);
+    format!("add pairs with the board where lengths are least certain, {place}, {}", length.lies()).into()
 }
 
 /// What lengths that no board showed would be known to.
@@ -227,7 +238,7 @@ pub(super) fn epipolar(case: &Case) -> Evidence {
     let limit = px_per_mm.map(|px| px * case.facts.tolerance_mm);
     Evidence {
         what: "epipolar error",
-        remedy: "look at the worst pair in camera-check.html",
+        remedy: "look at the worst pair in camera-check.html".into(),
         value: Some(error.rms_px),
         limit,
         unit: "px",

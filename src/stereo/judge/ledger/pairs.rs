@@ -55,7 +55,7 @@ pub(super) fn pair_scatter(case: &Case) -> Evidence {
     };
     Evidence {
         what: "scatter of pairs",
-        remedy: "add pairs with the board elsewhere and tilted otherwise",
+        remedy: "add pairs with the board elsewhere and tilted otherwise".into(),
         value: scatter.ratio,
         limit: None,
         unit: "",
@@ -221,7 +221,7 @@ pub(super) fn reach(case: &Case) -> [Evidence; 2] {
         unit,
         allows: Verdict::Pass,
         detail,
-        remedy: "",
+        remedy: "".into(),
     };
     [
         line(

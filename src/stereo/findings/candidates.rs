@@ -1,0 +1,133 @@
+//! What may explain a change over the series, and which of it does.
+//!
+//! In: the pairs as a linear problem, and which share of the change each has. Out: what is not told apart from what explains most, that first. Method: each
+//! candidate frees its numbers; its likelihood, less what its numbers cost, is compared. A cause of one number that does as well as more of them is
+//! what happened. A lens that is focused moves its picture as well, which one number does not say; that looks much like a camera that turned, and is
+//! told where the focal length itself is needed. Goes wrong: a camera that moved and was focused at once.
+
+use nalgebra::DVector;
+
+use crate::difference::TOLD_APART;
+use crate::stereo::Side;
+use crate::stereo::calibrate::Calibration;
+use crate::stereo::findings::hypothesis::{Hypothesis, any_place, centred, refocused};
+use crate::stereo::findings::series::{Change, Linear};
+use crate::stereo::pairs::Cause;
+
+enum What<'a> {
+    One(&'a Hypothesis),
+    /// The lens of a side was focused otherwise: its focal length and where its picture lies.
+    Refocused(Side),
+    /// The right camera stands and looks otherwise, in all six numbers.
+    Elsewhere,
+}
+
+/// A cause with its numbers, and what it explains.
+pub(super) struct Candidate<'a> {
+    what: What<'a>,
+    directions: Vec<DVector<f64>>,
+    pub change: Change,
+}
+
+impl<'a> Candidate<'a> {
+    /// All of them for a pattern over the pairs.
+    pub fn all(
+        linear: &Linear,
+        hypotheses: &'a [Hypothesis],
+        calibration: &Calibration,
+        by_pair: &[f64],
+        is_step: bool,
+    ) -> Vec<Candidate<'a>> {
+        let (layout, rig) = (&calibration.layout, calibration.rig());
+        let of = |what: What<'a>, directions: Vec<DVector<f64>>| {
+            Some(Candidate { change: linear.change(&directions, by_pair)?, what, directions })
+        };
+        let one = |h: &'a Hypothesis| of(What::One(h), vec![h.direction.clone()]);
+        let mut all: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
+        // Several numbers of a step need more pairs than they are; several that drift at once are no cause.
+        let tells = |numbers: usize| is_step && linear.pairs() > numbers + 2;
+        let place = any_place(layout);
+        if tells(place.len()) {
+            all.extend(of(What::Elsewhere, place));
+        }
+        let scatter = least_scatter(&all);
+        for side in Side::BOTH.into_iter().filter(|_| tells(3)) {
+            let centre = centred(layout, side);
+            let focus = refocused(layout, rig, &[side], 0.01);
+            let refocused = of(What::Refocused(side), [&[focus][..], &centre].concat());
+            let moved = linear.change(&centre, by_pair);
+            // A picture that moved without a focus is no lens that was focused.
+            let is_needed = |refocused: &Candidate| {
+                let cost = 0.5 * (linear.pairs() as f64).ln();
+                let gain = |moved: &Change| 0.5 * (refocused.change.gain - moved.gain) / scatter;
+                moved.as_ref().is_some_and(|moved| gain(moved) - cost > TOLD_APART)
+            };
+            all.extend(refocused.filter(is_needed));
+        }
+        all
+    }
+
+    pub fn cause(&self) -> Cause {
+        match self.what {
+            What::One(h) => h.cause,
+            What::Refocused(_) => Cause::Focus,
+            What::Elsewhere => Cause::CameraMoved,
+        }
+    }
+
+    /// The change of the shared numbers, whole.
+    pub fn whole(&self) -> DVector<f64> {
+        let sum = DVector::zeros(self.directions[0].len());
+        self.directions.iter().zip(self.change.amounts.iter()).fold(sum, |sum, (d, a)| sum + d * *a)
+    }
+
+    /// By how much, with its unit.
+    pub fn size(&self) -> (f64, &'static str) {
+        let amounts = &self.change.amounts;
+        match self.what {
+            What::One(h) => (amounts[0], h.unit),
+            What::Refocused(_) => (amounts[0], "%"),
+            What::Elsewhere => (amounts.rows(0, 3).norm().to_degrees(), "deg"),
+        }
+    }
+
+    fn words(&self) -> String {
+        let (size, unit) = self.size();
+        let amounts = &self.change.amounts;
+        match self.what {
+            What::One(h) => format!("{} by {size:.3} {unit}", h.words),
+            What::Refocused(side) => format!(
+                "the {} lens was focused otherwise (its focal length changed by {size:.3} %, and its picture moved by {:.2} px)",
+                side.name(),
+                amounts[1].hypot(amounts[2])
+            ),
+            What::Elsewhere => format!("the right camera stands and looks otherwise by {size:.3} deg"),
+        }
+    }
+}
+
+/// The scatter of the one that explains most: what the others are judged by.
+fn least_scatter(candidates: &[Candidate]) -> f64 {
+    candidates.iter().map(|c| c.change.scatter).fold(f64::INFINITY, f64::min).max(1.0)
+}
+
+/// The candidates that are not told apart from the one that explains most, that one first.
+pub(super) fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -> Vec<&'b Candidate<'a>> {
+    let scatter = least_scatter(candidates);
+    // Logarithm of the likelihood but for a constant, less what the numbers cost.
+    let evidence =
+        |c: &Candidate| 0.5 * c.change.gain / scatter - 0.5 * c.change.amounts.len() as f64 * (pairs as f64).ln();
+    let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
+    let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
+    equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+    // A single number that does as well as several is what happened.
+    if equals.iter().any(|c| matches!(c.what, What::One(_))) {
+        equals.retain(|c| matches!(c.what, What::One(_)));
+    }
+    equals
+}
+
+/// What happened and by how much, in words, for each cause that it may have been.
+pub(super) fn described(equals: &[&Candidate]) -> String {
+    equals.iter().map(|candidate| candidate.words()).collect::<Vec<String>>().join(", or ")
+}
