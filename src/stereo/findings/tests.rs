@@ -1,15 +1,16 @@
 //! Faults planted in the corners of a series: each must be named, and a clean series of any noise must lose nothing.
 
+mod lenses;
+
 use nalgebra::Vector3;
 
 use crate::geometry::transform;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side};
-use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::calibrate::Calibration;
 use crate::stereo::findings::standing::{Asked, calibrate_since, calibrate_standing};
 use crate::stereo::findings::{Finding, Kind, hold};
 use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::verdict::Verdict;
-use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::options::Options;
 use crate::stereo::synthetic::{BROWN4, World, judged};
@@ -315,35 +316,6 @@ fn what_changed_is_held() {
     assert!(said("unknown") == said("focus|camera-moved") && said("other-board").is_empty());
     let pairs = ["0017".to_owned(), "0018".to_owned()];
     assert!(hold("unknown", Some(&pairs)).unwrap().ends_with("or `--since 0017`: the rig of the last 2 pairs"));
-}
-
-fn with_lenses(corners: &Corners, known: KnownLenses) -> (Calibration, Vec<Finding>) {
-    calibrate_standing(corners, &asked(Options { known: Some(known), ..Options::default() })).unwrap()
-}
-
-fn not_simultaneous(told: &[Finding]) -> bool {
-    told.iter().any(|finding| finding.cause == Cause::NotSimultaneous.word())
-}
-
-#[test]
-fn lenses_that_are_not_those_of_the_pictures_are_no_pictures_of_two_moments() {
-    let world = World::new(12, 88);
-    let earlier = calibrate(&World::new(12, 188).corners(188), &BROWN4).unwrap();
-    let known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
-    let (found, told) = with_lenses(&world.corners(71), known.exchanged());
-    let check = found.lens_check.as_ref().unwrap();
-    assert_eq!(check.causes, [Cause::Exchanged]);
-    assert!(check.remedy().starts_with("exchange the folders"), "{}", check.remedy());
-    assert!(!not_simultaneous(&told), "{told:?}");
-
-    // Both at once: lenses that are far off, and a rig that is another one in each pair.
-    let mut other = earlier.rig().clone();
-    [&mut other.left, &mut other.right]
-        .into_iter()
-        .for_each(|camera| (camera.fx, camera.fy) = (1.08 * camera.fx, 1.08 * camera.fy));
-    let (found, told) = with_lenses(&world.corners_by_hand(71, 0.02), KnownLenses::of_rig(&other, &Side::BOTH));
-    assert!(found.lens_check.as_ref().unwrap().contradicts());
-    assert!(not_simultaneous(&told), "{told:?}");
 }
 
 /// The corners where the board of each pair goes by `way_mm` while a picture is read out, row by row.

@@ -1,0 +1,40 @@
+//! Lenses that are known and not those of the pictures.
+
+use super::asked;
+use crate::imaging::{Corners, Side};
+use crate::stereo::calibrate::{Calibration, calibrate};
+use crate::stereo::findings::Finding;
+use crate::stereo::findings::standing::calibrate_standing;
+use crate::stereo::model::KnownLenses;
+use crate::stereo::pairs::Cause;
+use crate::stereo::select::options::Options;
+use crate::stereo::synthetic::{BROWN4, World};
+
+fn with_lenses(corners: &Corners, known: KnownLenses) -> (Calibration, Vec<Finding>) {
+    calibrate_standing(corners, &asked(Options { known: Some(known), ..Options::default() })).unwrap()
+}
+
+fn not_simultaneous(told: &[Finding]) -> bool {
+    told.iter().any(|finding| finding.cause == Cause::NotSimultaneous.word())
+}
+
+#[test]
+fn lenses_that_are_not_those_of_the_pictures_are_no_pictures_of_two_moments() {
+    let world = World::new(12, 88);
+    let earlier = calibrate(&World::new(12, 188).corners(188), &BROWN4).unwrap();
+    let known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
+    let (found, told) = with_lenses(&world.corners(71), known.exchanged());
+    let check = found.lens_check.as_ref().unwrap();
+    assert_eq!(check.causes, [Cause::Exchanged]);
+    assert!(check.remedy().starts_with("exchange the folders"), "{}", check.remedy());
+    assert!(!not_simultaneous(&told), "{told:?}");
+
+    // Both at once: lenses that are far off, and a rig that is another one in each pair.
+    let mut other = earlier.rig().clone();
+    [&mut other.left, &mut other.right]
+        .into_iter()
+        .for_each(|camera| (camera.fx, camera.fy) = (1.08 * camera.fx, 1.08 * camera.fy));
+    let (found, told) = with_lenses(&world.corners_by_hand(71, 0.02), KnownLenses::of_rig(&other, &Side::BOTH));
+    assert!(found.lens_check.as_ref().unwrap().contradicts());
+    assert!(not_simultaneous(&told), "{told:?}");
+}
