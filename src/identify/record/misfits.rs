@@ -99,7 +99,6 @@ pub(super) fn of_verify(set: &Dataset, found: &Identification) -> Option<Finding
 mod tests {
     use nalgebra::Vector3;
 
-    use super::*;
     use crate::identify::examine::sessions::Along;
     use crate::identify::record::Record;
     use crate::identify::record::findings::{Findings, findings};
