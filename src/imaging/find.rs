@@ -262,7 +262,7 @@ pub fn seen_in(picture: &Picture, board: Board) -> Look {
 /// The board in a picture; where markers were looked for and none was read, the plain board that it shows, if it shows a whole one.
 fn detected(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let counted = |refusal: Refusal| {
-        let is_unread = board.is_coded() && refusal.seen.is_none() && refusal.reason.ends_with(coded::UNREAD);
+        let is_unread = board.is_coded() && coded::is_unread(&refusal);
         let Some(Seen { squares, ends: true }) = is_unread.then(|| squares_of(picture)).flatten() else {
             return refusal;
         };

@@ -58,13 +58,19 @@ pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Option<
     other_markers(picture, board, (dictionary, own), grid)
 }
 
-/// How the reason ends where a grid of corners holds no marker.
-pub const UNREAD: &str = "and no marker among them that can be read";
+/// How the reason ends where a grid of corners holds no marker, and the whole of it where there is no grid.
+const UNREAD: &str = "and no marker among them that can be read";
+const NO_GRID: &str = "no board found";
+
+/// Whether that is why a picture was refused.
+pub fn is_unread(refusal: &Refusal) -> bool {
+    refusal.reason.ends_with(UNREAD) || refusal.reason == NO_GRID
+}
 
 /// What is said of grids in which nothing was read.
 pub fn unread(grids: &[Places]) -> Refusal {
     let corners = |grid: &Places| format!("shows {} corners of squares, {UNREAD}", grid.count());
-    largest(grids).map_or_else(|| "no board found".to_owned(), corners).into()
+    largest(grids).map_or_else(|| NO_GRID.to_owned(), corners).into()
 }
 
 /// The largest of some grids; `None` where it is too small for a square.

@@ -14,4 +14,4 @@ mod numbering;
 mod tests;
 
 pub use detection::{BY_LAYOUT, HAS_MARKERS, HAS_TAGS, detect, of_other_kind};
-pub use explain::UNREAD;
+pub use explain::is_unread;
