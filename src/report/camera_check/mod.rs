@@ -139,7 +139,7 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
 fn ledger(judged: &Judged) -> Markup {
     // What stands among the things to do is not said again.
     let next = summary::next(judged);
-    let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&line.remedy.as_ref()) {
+    let with_remedy = |line: &Evidence| match line.remedy.is_empty() || next.contains(&&*line.remedy) {
         true => line.detail.clone(),
         false => format!("{}. To do: {}", line.detail, on_this_page(&line.remedy)),
     };

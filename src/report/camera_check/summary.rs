@@ -216,8 +216,8 @@ pub(super) fn next(judged: &Judged) -> Vec<&str> {
     // Lenses that are not these cameras' spoil all other lines.
     let lenses = judged.evidence.iter().find(|line| line.what == KNOWN_LENSES && line.allows != Verdict::Pass);
     let decides = |line: &&Evidence| lenses.is_none() && line.allows != Verdict::Pass && !is_explained(line);
-    let deciding = judged.deciding().filter(decides).map(|line| line.remedy.as_ref());
-    let first = lenses.into_iter().map(|line| line.remedy.as_ref());
+    let deciding = judged.deciding().filter(decides).map(|line| &*line.remedy);
+    let first = lenses.into_iter().map(|line| &*line.remedy);
     let mut told: Vec<&str> =
         first.chain(happened).chain(changed).chain(board).chain(deciding.filter(|remedy| !remedy.is_empty())).collect();
     told.extend(judged.advice.iter().map(String::as_str));
