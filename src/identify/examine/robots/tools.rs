@@ -42,6 +42,9 @@ impl Tools {
 pub(super) const STEP_RAD: f64 = 1e-3;
 pub(super) const STEP_MM: f64 = 0.5;
 
+/// Times that it is looked for anew around the best: far from it the squares are no parabola.
+const VERTICES: usize = 3;
+
 /// A tool that moved.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::identify::examine) struct Moved {
@@ -194,8 +197,12 @@ impl Table {
             points.together(std::slice::from_ref(&all), &tools.weights)
         };
         let step = if self.points.robot.joints[joint].slides { STEP_MM } else { STEP_RAD };
-        let [less, more] = [left(-step), left(step)].map(|left| left.squares - tools.together.squares);
-        let off = (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
+        let (mut off, mut here) = (0.0, tools.together.squares);
+        for _ in 0..VERTICES {
+            let [less, more] = [off - step, off + step].map(|off| left(off).squares - here);
+            off += (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
+            here = left(off).squares;
+        }
         // How the joint is counted is how its zero is.
         Some((left(off), self.points.robot.joints[joint].sign * off))
     }
