@@ -647,7 +647,8 @@ fn targets_of_a_robot_whose_joints_were_mended_are_refused() {
     std::fs::write(folder.path().join("targets.csv"), csv(&postures(&nominal, 4))).unwrap();
     let with = |mended: &[&str]| {
         let mended = mended.iter().map(|said| (*said).to_owned()).collect();
-        let check = Check { advice: Advice::Check, reason: "the floor shook".to_owned(), out_of_tolerance: false, mended };
+        let check =
+            Check { advice: Advice::Check, reason: "the floor shook".to_owned(), out_of_tolerance: false, mended };
         std::fs::write(folder.path().join("identified.toml"), file::to_toml_checked(&real, Some(&check))).unwrap();
     };
     with(&[]);

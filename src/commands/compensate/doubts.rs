@@ -65,11 +65,15 @@ pub(super) fn refuse_unread(targets: &Utf8Path) -> Result<()> {
 
 /// Whether the record beside an identified robot says that it is of that file, and was identified from this one.
 pub(super) fn is_made_of(identified: &Utf8Path, robot: &Utf8Path) -> bool {
-    let record = Provenance::of_json(&identified.with_file_name("identification.json"));
-    let holds = |list: &[Digested], file: &Utf8Path| {
-        Digested::read(file).is_some_and(|here| list.iter().any(|known| known.sha256 == here.sha256))
-    };
-    record.is_some_and(|run| holds(&run.inputs, robot) && holds(&run.outputs, identified))
+    record_of(identified).is_some_and(|run| holds(&run.inputs, robot) && holds(&run.outputs, identified))
+}
+
+fn record_of(identified: &Utf8Path) -> Option<Provenance> {
+    Provenance::of_json(&identified.with_file_name("identification.json"))
+}
+
+fn holds(list: &[Digested], file: &Utf8Path) -> bool {
+    Digested::read(file).is_some_and(|here| list.iter().any(|known| known.sha256 == here.sha256))
 }
 
 /// That both robots are ones that `identify` found, and the second was not found from the first.
@@ -77,7 +81,9 @@ pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<Stri
     if !file::is_identified(robot) || !file::is_identified(identified) {
         return None;
     }
-    (!is_made_of(identified, robot)).then(|| {
+    // That file may have been edited since.
+    let is_made_of = record_of(identified).is_some_and(|run| holds(&run.inputs, robot));
+    (!is_made_of).then(|| {
         format!(
             "--robot {robot} is itself a robot that `identify` found, and {identified} was not identified from it: the targets are taken as written \
              for it; where they were written for the nominal robot, `--robot` names the file that `identify` was given"

@@ -111,8 +111,8 @@ fn a_lens_that_was_focused_and_moved_its_picture() {
     let world = World { sigma_px: 0.01, ..World::new(16, 7) };
     let corners = planted(&world, 8, 8..16, |after| {
         let right = &mut after.rig.right;
-        (right.fx, right.fy) = (right.fx * 1.006, right.fy * 1.006);
-        (right.cx, right.cy) = (right.cx + 1.5, right.cy - 1.0);
+        (right.fx, right.fy) = (right.fx * 1.001, right.fy * 1.001);
+        (right.cx, right.cy) = (right.cx + 0.3, right.cy - 0.2);
     });
     let (_, told) = standing(&corners);
     assert!(told[0].cause.contains("focus") && told[0].action.contains("lens was focused otherwise"), "{told:?}");

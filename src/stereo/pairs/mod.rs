@@ -1,7 +1,6 @@
 //! Which pairs belong to one rig, how their corners are numbered, and what happened to the others.
 
 pub mod candidates;
-mod cut;
 pub mod discarded;
 pub mod mixups;
 mod moved;

@@ -4,8 +4,7 @@
 //! nearer by each camera along its own rays: the two places that the cameras give it are apart along the baseline, by that share of
 //! it. One number explains such a pair; a board or a camera that moved between the two pictures takes six. A board that moved along the
 //! baseline looks the same, and a baseline that changed: all are told, what is commonest first, that the board moved; where others show the same
-//! other size, and, where others moved, three do, that it is a board. A picture that was cut otherwise, which needs two numbers, is [`cut`]. Goes wrong:
-//! several boards of one other size that all moved alike.
+//! other size, and, where others moved, three do, that it is a board. Goes wrong: several boards of one other size that all moved alike.
 
 use nalgebra::Vector3;
 
@@ -13,7 +12,6 @@ use crate::geometry::rotation_vector;
 use crate::stereo::data::View;
 use crate::stereo::init::board_pose;
 use crate::stereo::model::Shared;
-use crate::stereo::pairs::cut;
 use crate::stereo::pairs::mixups::Series;
 use crate::stereo::pairs::numbering::renumbered;
 use crate::stereo::pairs::{Cause, DiscardedPair, Missed};
@@ -48,9 +46,6 @@ pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64, 
         let missed = missed_px.map_or(String::new(), |px| {
             format!(" (its corners miss the rig by {px:.2} px, those of others by {usual_px:.2} px)")
         });
-        if let Some(cut) = cut::find(series, i) {
-            return DiscardedPair::new(pair, Cause::Unknown, format!("{}{missed}. {}", cut.statement(), cut::REMEDY));
-        }
         let same = |other: &Apart| {
             larger.zip(other.larger).is_some_and(|(own, other)| (own - other).abs() <= ONE_SIZE * own.abs())
         };
