@@ -11,7 +11,7 @@ use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
 use crate::linear_algebra::rows;
 use crate::progress;
-use crate::stereo::board_pose::pair_excess::{farthest_pair, farthest_px, pair_excess};
+use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::judge::assessment::Judged;
@@ -91,8 +91,6 @@ pub struct Calibrated {
     pub pair_excess: Option<f64>,
     /// How far the pair disagreed that did most, as chi-square of six numbers beside that.
     pub farthest_pair: Option<f64>,
-    /// By how much the pair missed the rig that did most, px.
-    pub farthest_px: Option<f64>,
     /// How many pairs with poses of their own made the rig.
     pub pairs: Option<usize>,
     /// The volume that the verdict was for.
@@ -146,9 +144,6 @@ struct NoiseRecord {
     /// How far the pair disagrees with the rig that does most, as chi-square of six numbers beside that excess.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     farthest_pair: Option<f64>,
-    /// By how much the pair misses the rig that does most, px.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    farthest_px: Option<f64>,
     /// How many pairs with poses of their own say so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pairs: Option<usize>,
@@ -253,7 +248,6 @@ impl CalibrationFile {
             added_px: noise.added_px,
             pair_excess: Some(pair_excess(calibration)),
             farthest_pair: farthest_pair(calibration),
-            farthest_px: farthest_px(calibration),
             pairs: Some(calibration.pair_scatter.groups),
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
@@ -361,7 +355,6 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
         noise: file.noise(),
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),
-        farthest_px: file.corner_noise.and_then(|n| n.farthest_px),
         pairs: file.corner_noise.and_then(|n| n.pairs),
         board: file.board.as_ref().and_then(|name| name.parse().ok()),
         volume: file.volume,

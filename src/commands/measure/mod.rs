@@ -92,7 +92,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Kn
     let board = config.target_board.board(args.target.board, args.target.squares, args.target.square_mm)?;
     let calibrated = calibration::read(rig_file)?;
     let doubts = heed_rig(&calibrated, rig_file);
-    let Calibrated { rig, noise, pair_excess, farthest_pair, farthest_px, volume, .. } = calibrated;
+    let Calibrated { rig, noise, pair_excess, farthest_pair, volume, .. } = calibrated;
     if rig.covariance.is_none() {
         progress::warn(format!(
             "{rig_file} holds no covariance: the points' uncertainties leave out that of the calibration"
@@ -104,8 +104,7 @@ fn knowledge(args: &Measure, config: &Config, rig_file: &Utf8Path) -> Result<(Kn
         ));
     }
     let (crossing_mm, tolerance_mm) = (config.measure.crossing_mm, config.tolerance_mm);
-    let known =
-        Knowledge { rig, noise, pair_excess, farthest_pair, farthest_px, volume, board, crossing_mm, tolerance_mm };
+    let known = Knowledge { rig, noise, pair_excess, farthest_pair, volume, board, crossing_mm, tolerance_mm };
     Ok((known, doubts))
 }
 

@@ -48,9 +48,8 @@ impl Run<'_> {
             }
             _ => None,
         };
-        let apart = self.of_two_moments();
         let finisher =
-            Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone, apart };
+            Finisher { run: &self, found, shared_covariance: &shared_covariance, known: &known, alone: &alone };
         let targets: Vec<Result<TargetPose, Refusal>> = (0..self.at.len())
             .into_par_iter()
             .map(|i| match (&self.refusals[i], &ended) {
@@ -90,8 +89,6 @@ struct Finisher<'a> {
     shared_covariance: &'a DMatrix<f64>,
     known: &'a Known<'a>,
     alone: &'a [Option<Alone>],
-    /// The poses that miss the rig as no pair of the calibration did.
-    apart: Vec<bool>,
 }
 
 impl Finisher<'_> {
@@ -103,8 +100,7 @@ impl Finisher<'_> {
         let outside = || consistency::of_outsider(&alone.part, &self.found.covariance);
         let change = change.copied().or_else(outside);
         let own = alone.chi_square.clamp(1.0, OUTSIDER_LIMIT);
-        let strays = |c: &Change| c.fall > stray_limit(self.run.known.farthest_pair) * own;
-        if let Some(change) = change.filter(|c| self.apart[i] || strays(c)) {
+        if let Some(change) = change.filter(|c| c.fall > stray_limit(self.run.known.farthest_pair) * own) {
             return Err(self.two_moments(i, alone, &change));
         }
         if !self.run.taking_part[i] && alone.chi_square > OUTSIDER_LIMIT * self.found.excess {

@@ -4,7 +4,7 @@
 //! `cam_from_board` and its covariance, or why there is none; the target's own shape; what all poses share; a judgement of the rig.
 //! `start` finds each pose by itself; `solve` is one least squares over all of them, within what is known before and through the windows
 //! that corners are measured in; `rig_change` finds poses and moments at which the rig is another, and what changed; `finish` makes the
-//! answers, and `series` is the list of these steps. `turns` numbers targets that look alike after a turn, `two_moments` finds poses that miss the rig as no pair of its calibration did. `print_share` asks the same
+//! answers, and `series` is the list of these steps. `turns` numbers targets that look alike after a turn. `print_share` asks the same
 //! equations what a calibration board's own print does to a rig, `pair_excess` how far the calibration's pairs scattered about it.
 
 mod answer;
@@ -17,7 +17,6 @@ pub mod series;
 mod solve;
 mod start;
 mod turns;
-mod two_moments;
 
 pub use answer::{MeasuredPose, Refusal, Series, Shape, Shared, TargetPose};
 pub use run::{Knowledge, Seen};

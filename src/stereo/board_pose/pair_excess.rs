@@ -5,7 +5,6 @@
 //! hand more. Method: Rao's score of a change of `right_from_left` at each pair, as for the poses of a run.
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::answer::POSE_LIMIT;
@@ -13,10 +12,7 @@ use crate::stereo::board_pose::print_share::{rig_basis, totals_of_pairs};
 use crate::stereo::board_pose::rig_change::consistency::{Change, of_member, of_outsider, of_usual};
 use crate::stereo::board_pose::solve::pose_block::Eliminated;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::data::View;
-use crate::stereo::init::board_pose::misfit_px;
-use crate::stereo::model::board_shape::FLAT;
-use crate::stereo::model::{Layout, Shared};
+use crate::stereo::model::Layout;
 use crate::stereo::solve::Problem;
 use crate::stereo::solve::uncertainty::invert;
 
@@ -32,13 +28,6 @@ pub fn pair_excess(calibration: &Calibration) -> f64 {
 pub fn farthest_pair(calibration: &Calibration) -> Option<f64> {
     let each = changes(calibration)?;
     each.iter().flatten().map(|change| change.fall).max_by(f64::total_cmp).map(|fall| fall / beyond_chance(&each))
-}
-
-/// By how much the pair misses the rig that does most of those that made it, px, its board taken as flat.
-pub fn farthest_px(calibration: &Calibration) -> Option<f64> {
-    let shared = Shared { rig: calibration.rig().clone(), shape_mm: FLAT };
-    let missed = |view: &View| Some(misfit_px(&shared, view)?.0);
-    calibration.views.par_iter().filter_map(missed).max_by(f64::total_cmp)
 }
 
 fn beyond_chance(each: &[Option<Change>]) -> f64 {

@@ -57,8 +57,6 @@ pub struct Knowledge {
     pub pair_excess: Option<f64>,
     /// How far the pair disagreed that did most, as chi-square of six numbers beside that, where it is known.
     pub farthest_pair: Option<f64>,
-    /// By how much the pair missed the rig that did most, px, where it is known.
-    pub farthest_px: Option<f64>,
     /// Where the boards were at the calibration, where that is known.
     pub volume: Option<Volume>,
     /// The target as drawn.

@@ -18,7 +18,6 @@ fn known(rig: &Rig, board: Board) -> Knowledge {
         noise: None,
         pair_excess: None,
         farthest_pair: None,
-        farthest_px: None,
         volume: None,
         board,
         crossing_mm: 0.01,

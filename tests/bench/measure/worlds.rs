@@ -6,7 +6,7 @@ use stereocal::simulate::draws::{Draws, Purpose};
 use stereocal::simulate::settings::Settings;
 use stereocal::simulate::world::World;
 use stereocal::stereo::Lens;
-use stereocal::stereo::board_pose::pair_excess::{farthest_pair, farthest_px, pair_excess};
+use stereocal::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use stereocal::stereo::board_pose::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::options::Options;
@@ -42,7 +42,6 @@ fn known_from(world: &World, corners: &Corners) -> Option<Knowledge> {
         noise: Some(found.own_noise),
         pair_excess: Some(pair_excess(&found)),
         farthest_pair: farthest_pair(&found),
-        farthest_px: farthest_px(&found),
         volume: None,
         board: world.target.drawing,
         crossing_mm: 0.01,
