@@ -317,7 +317,7 @@ fn verify_says_which_tool_a_robot_asks_for() {
 fn columns_of_a_robots_table_may_begin_with_one_that_is_skipped() {
     let folder = Folder(workplace());
     folder.file("dh.csv", "5,90,0,310,0\n7,0,425,0,-90\n9,0,80,0,0\n");
-    let arguments = ["robot", "import", "dh.csv", "--columns", "-,alpha,a,d,theta"];
+    let arguments = ["robot", "import", "dh.csv", "--columns", "-,alpha,a,d,theta", "--dh", "classic"];
     let read = stereocal(Path::new(folder.0.path()), &arguments);
     assert!(read.status.success() && stdout(&read).contains("425.0000"), "{}", stderr(&read));
 }
