@@ -17,6 +17,8 @@ const MOST_BYTES: u64 = 1 << 20;
 
 /// The quality from 1 to 100 that the picture seems to have been saved with; `None` where it is no JPEG.
 pub fn jpeg_quality(path: &Utf8Path) -> Option<u32> {
+    // A pipe would be waited for.
+    std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
     let mut bytes = Vec::new();
     std::fs::File::open(path).ok()?.take(MOST_BYTES).read_to_end(&mut bytes).ok()?;
     of_bytes(&bytes)
