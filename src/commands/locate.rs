@@ -77,17 +77,16 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     strays.iter().for_each(progress::warn);
     doubts.extend(strays);
     let mut placement = PlacementFile::new(args.robot.as_str(), &set, Some(&located.placed), &held_out);
+    let own = of_rows_and_fit(&doubts, &located.fit);
+    let status = if own.is_none() { Status::Done } else { Status::OutOfTolerance };
     placement.check = match check {
         Some(Check { advice: Advice::DoNotUse, .. }) if !located.fit.contradicted => check,
-        check => of_rows_and_fit(&doubts, &located.fit).or(check),
+        check => own.or(check),
     };
     let content = LocatedFile { placement, fit: located.fit };
     let json = out.write_json(PLACEMENT, &content)?;
-    let is_doubted = !doubts.is_empty();
-    let summary = || report::located::summary(&content.placement, &content.fit, is_doubted, &out);
+    let summary = || report::located::summary(&content.placement, &content.fit, !doubts.is_empty(), &out);
     let stdout = if args.measure.output.json { json } else { summary() };
-    let is_whole = content.fit.objection().is_none() && !is_doubted;
-    let status = if is_whole { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status: status.or_worse(heeded) })
 }
 

@@ -78,13 +78,13 @@ impl Turn {
     }
 }
 
-/// How a joint stands: sine and cosine of its alpha, its beta and its turn, and its way along its axis, mm.
+/// How a joint stands at a pose, or at several: sine and cosine of its alpha, its beta and its turn, and its way along its axis, mm.
 #[derive(Debug, Clone, Copy)]
-pub struct Stance {
-    pub alpha: [f64; 2],
-    pub beta: [f64; 2],
-    pub turn: [f64; 2],
-    pub shift_mm: f64,
+pub struct Stance<T = f64> {
+    pub alpha: [T; 2],
+    pub beta: [T; 2],
+    pub turn: [T; 2],
+    pub shift_mm: T,
 }
 
 impl Stance {

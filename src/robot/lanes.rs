@@ -57,13 +57,8 @@ impl Turns {
     }
 }
 
-/// How a joint stands at each of the poses (see [`Stance`]).
-pub struct Stances {
-    pub alpha: [Lane; 2],
-    pub beta: [Lane; 2],
-    pub turn: [Lane; 2],
-    pub shift_mm: Lane,
-}
+/// How a joint stands at each of the poses.
+pub type Stances = Stance<Lane>;
 
 impl Stances {
     /// At one of the poses.

@@ -23,10 +23,9 @@ pub(super) fn refuse_corrected(targets: &Utf8Path, folders: &[&Utf8Path]) -> Res
     let near: BTreeSet<Utf8PathBuf> = near.collect();
     let below = |folder: &Utf8PathBuf| folder.read_dir_utf8().into_iter().flatten().flatten().map(|e| e.into_path());
     let all = near.iter().cloned().chain(near.iter().flat_map(below));
-    let hash = Digested::read(targets).map(|digested| digested.sha256);
-    let holds = |list: &[Digested]| list.iter().any(|known| Some(&known.sha256) == hash.as_ref());
+    let given = Digested::read(targets);
     // Of a run that changed nothing both are one.
-    let wrote = |run: &Provenance| holds(&run.outputs) && !holds(&run.inputs);
+    let wrote = |run: &Provenance| holds(&run.outputs, given.as_ref()) && !holds(&run.inputs, given.as_ref());
     let mut runs = all.filter_map(|folder| Provenance::of_json(&folder.join("compensate.json")));
     let Some(run) = runs.find(wrote) else { return Ok(()) };
     Err(config::Error::Usage {
@@ -65,15 +64,16 @@ pub(super) fn refuse_unread(targets: &Utf8Path) -> Result<()> {
 
 /// Whether the record beside an identified robot says that it is of that file, and was identified from this one.
 pub(super) fn is_made_of(identified: &Utf8Path, robot: &Utf8Path) -> bool {
-    record_of(identified).is_some_and(|run| holds(&run.inputs, robot) && holds(&run.outputs, identified))
+    let [found, given] = [identified, robot].map(Digested::read);
+    record_of(identified).is_some_and(|run| holds(&run.inputs, given.as_ref()) && holds(&run.outputs, found.as_ref()))
 }
 
 fn record_of(identified: &Utf8Path) -> Option<Provenance> {
     Provenance::of_json(&identified.with_file_name("identification.json"))
 }
 
-fn holds(list: &[Digested], file: &Utf8Path) -> bool {
-    Digested::read(file).is_some_and(|here| list.iter().any(|known| known.sha256 == here.sha256))
+fn holds(list: &[Digested], file: Option<&Digested>) -> bool {
+    file.is_some_and(|file| list.iter().any(|known| known.sha256 == file.sha256))
 }
 
 /// That both robots are ones that `identify` found, and the second was not found from the first.
@@ -82,7 +82,7 @@ pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<Stri
         return None;
     }
     // That file may have been edited since.
-    let is_made_of = record_of(identified).is_some_and(|run| holds(&run.inputs, robot));
+    let is_made_of = record_of(identified).is_some_and(|run| holds(&run.inputs, Digested::read(robot).as_ref()));
     (!is_made_of).then(|| {
         format!(
             "--robot {robot} is itself a robot that `identify` found, and {identified} was not identified from it: the targets are taken as written \

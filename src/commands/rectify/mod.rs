@@ -69,7 +69,7 @@ pub fn run(args: &Rectify, config: &Config, run: Run) -> Result<Outcome> {
     let rectified = written(&out, &kept);
     let boards = boards(args, config, board)?;
     let found = if args.undistort_only { None } else { look_for(&rectified, &boards) };
-    file.size = rows::size(found.as_ref(), board, matrices.as_ref()).map(|size| size.against(trusted_mm));
+    file.size = rows::size(found.as_ref(), board, matrices.as_ref(), trusted_mm);
     let (file, shown) = rows::judge(file, kept, found, &boards);
     let of_board = report::rectify::doubts(&file);
     of_board.iter().filter(|_| lost.is_none()).for_each(progress::warn);

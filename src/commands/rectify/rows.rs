@@ -125,12 +125,13 @@ pub(super) fn judge(
     }
 }
 
-/// How large the board comes out that calibrated the rig, where it is the one that was found.
+/// How large the board comes out that calibrated the rig, where it is the one that was found, beside what lengths can be trusted to, mm.
 pub(super) fn size(
     found: Option<&Found>,
     calibrated: Option<Board>,
     matrices: Option<&Matrices>,
+    trusted_mm: Option<f64>,
 ) -> Option<SizeResidual> {
     let found = found.filter(|found| Some(found.board) == calibrated)?;
-    SizeResidual::of(&found.pairs, &found.board, matrices?)
+    SizeResidual::of(&found.pairs, &found.board, matrices?, trusted_mm)
 }

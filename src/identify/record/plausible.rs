@@ -189,7 +189,10 @@ mod tests {
 
     #[test]
     fn a_joint_that_turns_a_per_cent_too_far_is_no_gears() {
-        let limit = term_limit(Parameter::Coupling(3, 3)).unwrap();
-        assert!((4.0..9.0).contains(&limit), "{limit}");
+        for (by, is_named) in [(2.0, false), (10.0, true), (-10.0, true)] {
+            let record = judged(Parameter::Coupling(3, 3), by);
+            assert_eq!(record.reason.contains("scale_4"), is_named, "{by}: {:?}", record.warnings);
+            assert_eq!(record.advice == Advice::Check, is_named, "{by}: {:?}", record.warnings);
+        }
     }
 }

@@ -113,10 +113,14 @@ pub struct RowResidual {
 
 /// Row differences, left minus right, px, of a pair's corners: the place in the left picture and the difference.
 pub fn row_differences(pair: &PairCorners, in_columns: bool) -> Vec<(Point2<f64>, f64)> {
-    let right = |col, row| pair.right.iter().find(|c| (c.col, c.row) == (col, row) && c.used);
     let along = |p: Point2<f64>| if in_columns { p.x } else { p.y };
-    let of = |left: &Corner| Some((left.px, along(left.px) - along(right(left.col, left.row)?.px)));
-    pair.left.iter().filter(|c| c.used).filter_map(of).collect()
+    in_both(pair).map(|(left, right)| (left.px, along(left.px) - along(right.px))).collect()
+}
+
+/// Corners that are used in both pictures.
+fn in_both(pair: &PairCorners) -> impl Iterator<Item = (&Corner, &Corner)> {
+    let right = |left: &Corner| pair.right.iter().find(|c| (c.col, c.row) == (left.col, left.row) && c.used);
+    pair.left.iter().filter(|c| c.used).filter_map(move |left| Some((left, right(left)?)))
 }
 
 /// The residual of differences; `None` without any.
@@ -144,18 +148,18 @@ pub struct SizeResidual {
 }
 
 impl SizeResidual {
-    /// Of corners in rectified pictures; `None` where no pair has enough of them.
-    pub fn of(pairs: &[PairCorners], board: &Board, matrices: &Matrices) -> Option<SizeResidual> {
+    /// Of corners in rectified pictures, beside what lengths can be trusted to, mm; `None` where no pair has enough of them.
+    pub fn of(
+        pairs: &[PairCorners],
+        board: &Board,
+        matrices: &Matrices,
+        trusted_mm: Option<f64>,
+    ) -> Option<SizeResidual> {
         let each: Vec<(f64, f64)> = pairs.iter().filter_map(|pair| size_of(pair, board, matrices)).collect();
         let times = median(each.iter().map(|(times, _)| *times))?;
         let disparity_px = median(each.iter().map(|(_, off_px)| *off_px))?;
         let diagonal_mm = (times - 1.0) * board.diagonal_mm();
-        Some(SizeResidual { pairs: each.len(), times, disparity_px, diagonal_mm, trusted_mm: None })
-    }
-
-    /// The same beside what lengths can be trusted to.
-    pub fn against(self, trusted_mm: Option<f64>) -> SizeResidual {
-        SizeResidual { trusted_mm, ..self }
+        Some(SizeResidual { pairs: each.len(), times, disparity_px, diagonal_mm, trusted_mm })
     }
 }
 
@@ -167,14 +171,12 @@ fn size_of(pair: &PairCorners, board: &Board, matrices: &Matrices) -> Option<(f6
     const FEWEST: usize = 4;
     let q = &matrices.disparity_to_depth;
     let along = |px: Point2<f64>| if matrices.in_columns() { px.y } else { px.x };
-    let right = |left: &&Corner| pair.right.iter().find(|c| (c.col, c.row) == (left.col, left.row) && c.used);
-    let both = pair.left.iter().filter(|c| c.used).filter_map(|left| Some((left, right(&left)?)));
     let of = |(left, right): (&Corner, &Corner)| {
         let at = q * Vector4::new(left.px.x, left.px.y, along(left.px) - along(right.px), 1.0);
         let place = Point3::from(at.xyz() / at.w);
         place.iter().all(|mm| mm.is_finite()).then_some((board.corner_mm(left.col, left.row), place, at.w / q[(3, 2)]))
     };
-    let seen: Vec<(Point3<f64>, Point3<f64>, f64)> = both.filter_map(of).collect();
+    let seen: Vec<(Point3<f64>, Point3<f64>, f64)> = in_both(pair).filter_map(of).collect();
     if seen.len() < FEWEST {
         return None;
     }
@@ -267,7 +269,7 @@ mod tests {
                             .iter()
                             .all(|pair| row_differences(pair, in_columns).iter().all(|(_, d)| d.abs() < ROUNDING))
                     );
-                    SizeResidual::of(&pairs, &board, &matrices).unwrap()
+                    SizeResidual::of(&pairs, &board, &matrices, None).unwrap()
                 };
                 let right = of(0.0);
                 assert!((right.times - 1.0).abs() < 1e-9 && right.disparity_px.abs() < 1e-6, "{right:?}");
@@ -278,14 +280,8 @@ mod tests {
                 }
             }
         }
-        assert_eq!(
-            SizeResidual::of(
-                &[PairCorners::default()],
-                &board,
-                &Matrices::new(&rig(Lens::Brown5, Vector3::x() * 180.0), Scaling::OPENCV).unwrap()
-            ),
-            None
-        );
+        let matrices = Matrices::new(&rig(Lens::Brown5, Vector3::x() * 180.0), Scaling::OPENCV).unwrap();
+        assert_eq!(SizeResidual::of(&[PairCorners::default()], &board, &matrices, None), None);
     }
 
     #[test]

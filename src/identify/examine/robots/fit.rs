@@ -36,6 +36,11 @@ const WHOLE: f64 = 1.5;
 pub(super) const PLACEMENT: usize = 6;
 pub(super) const TARGET: usize = 3;
 
+/// Steps of a joint's zero by which its best value is found, rad and mm, and times that it is looked for anew around the best: far from it the squares
+/// are no parabola.
+const ZERO_STEP: [f64; 2] = [1e-3, 0.5];
+const VERTICES: usize = 3;
+
 /// The typical size of an error.
 fn typical_mm(errors_mm: &[Vector3<f64>]) -> f64 {
     median(errors_mm.iter().map(Vector3::norm)).unwrap_or(0.0).max(LEAST_MM)
@@ -79,6 +84,13 @@ impl Left {
     /// Scatter of a coordinate, mm.
     pub(super) fn scatter_mm(&self) -> f64 {
         (self.squares / self.freedom()).sqrt()
+    }
+
+    /// The logarithm of the likelihood of a cause that took so many numbers of so many rows, but for a constant. The three coordinates of a row share what
+    /// the model lacks, and count as one number; what is free costs as Schwarz has it.
+    pub(super) fn likelihood(&self, rows: usize, free: f64) -> f64 {
+        let numbers = TARGET as f64 * rows as f64;
+        -(numbers * self.squares.max(f64::MIN_POSITIVE).ln() + free * numbers.ln()) / 6.0
     }
 
     /// Takes the weight of those of its rows that are gross errors.
@@ -156,6 +168,41 @@ impl Points {
                 weights[row] = (WHOLE * typical / error.norm().max(LEAST_MM)).min(1.0);
             }
         })
+    }
+
+    /// A step of a joint's zero, rad (mm).
+    pub(super) fn zero_step(&self, joint: usize) -> f64 {
+        ZERO_STEP[usize::from(self.robot.joints[joint].slides)]
+    }
+
+    /// An amount of a joint's zero, rad (mm), for a person.
+    pub(super) fn zero_said(&self, joint: usize, off: f64) -> String {
+        if self.robot.joints[joint].slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) }
+    }
+
+    /// What one robot for these rows leaves where a joint stands elsewhere in some, by as much as leaves least, and how far that is, rad (mm); `never` is
+    /// what it leaves where the joint does not. Squares of errors are a parabola of that.
+    pub(super) fn elsewhere(
+        &self,
+        joint: usize,
+        there: &[usize],
+        (rows, weights): (&[usize], &[f64]),
+        never: &Left,
+    ) -> Option<(Left, f64)> {
+        let all = [rows.to_vec()];
+        let at = |off: f64| {
+            let mut points = self.clone();
+            there.iter().for_each(|&row| points.joints_rad[row][joint] += off);
+            points.together(&all, weights)
+        };
+        let step = self.zero_step(joint);
+        let (mut off, mut left) = (0.0, never.clone());
+        for _ in 0..VERTICES {
+            let [less, more] = [off - step, off + step].map(|off| at(off).squares - left.squares);
+            off += (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
+            left = at(off);
+        }
+        Some((left, off))
     }
 
     /// The same with these parameters beside those of the links.

@@ -10,7 +10,6 @@
 use nalgebra::Vector3;
 
 use super::fit::{Left, Points};
-use super::tools::{STEP_MM, STEP_RAD};
 use super::{BEATS, CHANCE, MUCH_LARGER, SHORTEST, Table, by_chance};
 use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
@@ -102,10 +101,8 @@ struct Cause {
 }
 
 impl Cause {
-    /// The logarithm of its likelihood but for a constant: the three coordinates of a row share what the model lacks.
     fn likelihood(&self) -> f64 {
-        let numbers = 3.0 * self.there.len() as f64;
-        -(numbers * self.left.squares.max(f64::MIN_POSITIVE).ln() + self.free * numbers.ln()) / 6.0
+        self.left.likelihood(self.there.len(), self.free)
     }
 }
 
@@ -115,13 +112,6 @@ const ROUNDS_OF_ZERO: usize = 8;
 /// A joint that stands elsewhere in some rows, where no row changes any more; `never` is what one state leaves.
 fn elsewhere(points: &Points, joint: usize, weights: &[f64], never: &Left) -> Option<Cause> {
     let rows: Vec<usize> = (0..weights.len()).collect();
-    let slides = points.robot.joints[joint].slides;
-    let step = if slides { STEP_MM } else { STEP_RAD };
-    let at = |there: &[bool], off: f64| {
-        let mut points = points.clone();
-        rows.iter().filter(|&&row| there[row]).for_each(|&row| points.joints_rad[row][joint] += off);
-        points.together(std::slice::from_ref(&rows), weights)
-    };
     let moved = |off: f64| -> Vec<Vector3<f64>> {
         let of_row = |q: &Vec<f64>| {
             let mut there = q.clone();
@@ -130,17 +120,14 @@ fn elsewhere(points: &Points, joint: usize, weights: &[f64], never: &Left) -> Op
         };
         points.joints_rad.iter().map(of_row).collect()
     };
-    let mut there = by_amount(&never.errors_mm, &moved(step));
+    let mut there = by_amount(&never.errors_mm, &moved(points.zero_step(joint)));
     for _ in 0..ROUNDS_OF_ZERO {
-        // Squares of errors are a parabola of how far it is.
-        let [less, more] = [-step, step].map(|off| at(&there, off).squares - never.squares);
-        let off = (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
-        let left = at(&there, off);
+        let of_it: Vec<usize> = rows.iter().copied().filter(|&row| there[row]).collect();
+        let (left, off) = points.elsewhere(joint, &of_it, (&rows, weights), never)?;
         let next = nearer(&left.errors_mm, &moved(off), &there);
         if next == there {
-            let by = if slides { format!("{:.3} mm", off.abs()) } else { format!("{:.3} deg", off.to_degrees().abs()) };
-            let what =
-                format!("where joint {} stands elsewhere by {by}, for play or the side that it came from", joint + 1);
+            let (number, by) = (joint + 1, points.zero_said(joint, off.abs()));
+            let what = format!("where joint {number} stands elsewhere by {by}, for play or the side that it came from");
             return Some(Cause { what, there, free: 1.0, left });
         }
         there = next;

@@ -38,13 +38,6 @@ impl Tools {
     }
 }
 
-/// Steps of a joint's zero by which its best value is found.
-pub(super) const STEP_RAD: f64 = 1e-3;
-pub(super) const STEP_MM: f64 = 0.5;
-
-/// Times that it is looked for anew around the best: far from it the squares are no parabola.
-const VERTICES: usize = 3;
-
 /// A tool that moved.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::identify::examine) struct Moved {
@@ -163,21 +156,19 @@ impl Table {
     }
 
     fn cause(&self, parts: &[Vec<usize>], what: String, left: &Left, free: f64) -> Cause {
-        let numbers = TARGET as f64 * self.rows.len() as f64;
-        let changes = parts.len() as f64 - 1.0;
-        // The three coordinates of a row share what the model lacks, and count as one number; what is free costs as Schwarz has it.
-        let squares = left.squares.max(f64::MIN_POSITIVE).ln();
-        let likelihood = -(numbers * squares + changes * free * numbers.ln()) / 6.0;
+        let likelihood = left.likelihood(self.rows.len(), (parts.len() as f64 - 1.0) * free);
         Cause { what, is_sensor: false, left_mm: left.scatter_mm(), likelihood }
     }
 
     /// Between two parts the zero of the joint that explains most.
     fn zero(&self, parts: &[Vec<usize>], tools: &Tools) -> Option<Cause> {
-        let joints = (1..self.points.robot.joints.len()).filter(|_| parts.len() == 2);
-        let zeros = joints.filter_map(|joint| Some((joint, self.with_zero(joint, parts, tools)?)));
+        let [_, there] = parts else { return None };
+        let rows = parts.concat();
+        let of = |joint| self.points.elsewhere(joint, there, (&rows, &tools.weights), &tools.together);
+        let zeros = (1..self.points.robot.joints.len()).filter_map(|joint| Some((joint, of(joint)?)));
         let (joint, (left, off)) = zeros.min_by(|a, b| a.1.0.squares.total_cmp(&b.1.0.squares))?;
-        let slides = self.points.robot.joints[joint].slides;
-        let by = if slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) };
+        // How the joint is counted is how its zero is.
+        let by = self.points.zero_said(joint, self.points.robot.joints[joint].sign * off);
         Some(self.cause(parts, format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0))
     }
 
@@ -186,25 +177,6 @@ impl Table {
         let tool = self.cause(&tools.parts, String::new(), &tools.apart, TARGET as f64);
         let zero = self.zero(&tools.parts, tools)?;
         (tool.likelihood - zero.likelihood < TOLD_APART).then_some(zero.what)
-    }
-
-    /// What one robot leaves where a joint stands elsewhere in the second part, by as much as leaves least: squares of errors are a parabola of that.
-    fn with_zero(&self, joint: usize, parts: &[Vec<usize>], tools: &Tools) -> Option<(Left, f64)> {
-        let all = parts.concat();
-        let left = |off: f64| {
-            let mut points = self.points.clone();
-            parts[1].iter().for_each(|&row| points.joints_rad[row][joint] += off);
-            points.together(std::slice::from_ref(&all), &tools.weights)
-        };
-        let step = if self.points.robot.joints[joint].slides { STEP_MM } else { STEP_RAD };
-        let (mut off, mut here) = (0.0, tools.together.squares);
-        for _ in 0..VERTICES {
-            let [less, more] = [off - step, off + step].map(|off| left(off).squares - here);
-            off += (less + more > 0.0).then(|| step * (less - more) / (2.0 * (less + more)))?;
-            here = left(off).squares;
-        }
-        // How the joint is counted is how its zero is.
-        Some((left(off), self.points.robot.joints[joint].sign * off))
     }
 
     /// The two stretches of rows that are of different tools.
