@@ -58,8 +58,7 @@ impl Standing {
     /// them.
     pub fn contradicted(self, recheck: &Recheck) -> Option<(String, f64)> {
         match self {
-            Standing::Undecided => recheck.contradiction(),
-            Standing::OwnData => recheck.contradiction_of_own(),
+            Standing::Undecided | Standing::OwnData => recheck.contradiction(),
             _ => None,
         }
     }

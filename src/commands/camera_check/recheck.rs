@@ -57,8 +57,10 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
     let mut found = recheck::recheck(&before, &corners)?;
-    // As of a change, what moves a length by less is nothing to act on.
-    found.strays.retain(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm);
+    // As of a change, what moves a length by less is nothing to act on; and what the calibration's own pairs scatter by is in its uncertainty.
+    let all_own = args.corners.is_some() && whole.is_some();
+    let is_own = |stray: &recheck::Stray| all_own || own.pairs.contains(&stray.pair);
+    found.strays.retain(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm && !is_own(stray));
 
     let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm)
         .by(whole.is_some())

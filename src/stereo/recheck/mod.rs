@@ -237,14 +237,6 @@ impl Recheck {
         (!self.strays.is_empty()).then(said)
     }
 
-    /// The same where the calibration was made of these pairs: the rig is not what changed since.
-    pub fn contradiction_of_own(&self) -> Option<(String, f64)> {
-        let (_, off_mm) = self.contradiction()?;
-        let said = strays::contradicting(&self.strays, self.length_mm);
-        let others = "the calibration was made of these pairs, and the others agree with it whatever happened since";
-        Some((format!("{said}; {others}"), off_mm))
-    }
-
     /// What changed, for a person.
     pub fn statement(&self) -> String {
         let of = |c: &CauseSeen| format!("{} by {:.4} {} (+- {:.4})", c.words, c.amount, c.unit, 2.0 * c.sigma);

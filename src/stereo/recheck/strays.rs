@@ -55,7 +55,7 @@ fn names(strays: &[Stray]) -> Vec<String> {
 }
 
 /// Which strays there are, and by how much.
-pub fn contradicting(strays: &[Stray], length_mm: f64) -> String {
+fn contradicting(strays: &[Stray], length_mm: f64) -> String {
     let names = names(strays);
     let (noun, verb) = if names.len() == 1 { ("pair", "contradicts") } else { ("pairs", "contradict") };
     let effect_mm = two_digits(largest_mm(strays));
