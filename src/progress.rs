@@ -55,15 +55,15 @@ pub fn bar(label: &str, length: u64) -> Step {
     Step { bar, begun: AtomicBool::new(false), ticker }
 }
 
-/// Says a line now and then where it has changed.
+/// Says a line now and then where more is done: while one part takes long, the time left that the others tell only grows.
 fn ticker(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (stop, stopped) = channel();
     let thread = std::thread::Builder::new().spawn(move || {
-        let mut last = String::new();
+        let mut last = None;
         while stopped.recv_timeout(BETWEEN_LINES) == Err(RecvTimeoutError::Timeout) {
-            let now = said(&bar);
-            if now != last {
-                line(&now);
+            let now = Some((bar.message(), bar.position())).filter(|_| bar.length() != Some(0));
+            if now.is_none() || now != last {
+                line(&said(&bar));
             }
             last = now;
         }

@@ -97,7 +97,7 @@ impl<'a> Candidate<'a> {
         match self.what {
             What::One(h) => format!("{} by {size:.3} {unit}", h.words),
             What::Refocused(side) => format!(
-                "the {} lens was focused otherwise (its focal length changed by {size:.3} %, and its picture moved by {:.2} px)",
+                "the {} lens was focused otherwise (focal length by {size:.3} %, its picture moved by {:.2} px)",
                 side.name(),
                 amounts[1].hypot(amounts[2])
             ),

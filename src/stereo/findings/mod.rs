@@ -197,7 +197,7 @@ struct WithoutOne {
     causes: Vec<Cause>,
 }
 
-/// The first pair that alone decides what a change is: without it other causes explain it, and none of these.
+/// The first pair that alone decides what a change is: without it the likeliest cause is none of these.
 fn without_one(
     linear: &Linear,
     hypotheses: &[Hypothesis],
@@ -212,7 +212,8 @@ fn without_one(
         let candidates = Candidate::all(&others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
         let now = likeliest(&candidates, others.pairs());
         let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
-        let is_other = !now.is_empty() && equals.iter().all(|candidate| !causes.contains(&candidate.cause()));
+        let first = *causes.first()?;
+        let is_other = equals.iter().all(|candidate| candidate.cause() != first);
         is_other.then(|| WithoutOne { pair: calibration.views[pair].pair.clone(), words: described(&now), causes })
     };
     (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next()

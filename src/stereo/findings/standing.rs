@@ -272,7 +272,13 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
         let fewest = fewest_pairs(asked.options.known.as_ref());
         change.remedy =
             hold(&change.cause, Some(&again.pairs).filter(|pairs| pairs.len() >= fewest).map(Vec::as_slice));
-        change.action = format!("the rig goes on changing: {}, and again {}", change.action, again.action);
+        let [from, by_mm] = [again.pairs.first().cloned(), again.effect_mm.map(|mm| format!("{mm:.4}"))];
+        change.action = format!(
+            "the rig goes on changing: {}; and it changed again from pair {} on, by up to {} mm",
+            change.action,
+            from.unwrap_or_default(),
+            by_mm.unwrap_or_default()
+        );
         // Lengths may be off by the larger of both.
         change.effect_mm = again.effect_mm.into_iter().chain(change.effect_mm).reduce(f64::max);
         return None;

@@ -158,7 +158,7 @@ fn print_scatter(calibration: &Calibration, facts: &Facts) -> Option<Warning> {
     let place_mm = sigma_px * depth_mm / calibration.rig().left.fx;
     (place_mm > MATTERS * facts.tolerance_mm).then(|| Warning {
         text: format!(
-            "the corners' places on the board scatter by about {place_mm:.4} mm each: a better board, not more pictures, would lower the \
+            "the corners' places on the board scatter by about {place_mm:.4} mm each: a better board would lower the \
              errors"
         ),
         reason: format!(

@@ -74,9 +74,12 @@ impl Judgement {
                 ))
             ),
             Judgement::Contradicts(changed) => format!(
-                "the calibration does not suit these pictures: {}; the points are off by {:.3} mm with it",
+                "the calibration does not suit these pictures: {}; the points are off by {:.3} mm with it{}",
                 causes(changed, rig, board),
-                changed.moves_mm
+                changed.moves_mm,
+                changed.scaled_mm.map_or(String::new(), |mm| format!(
+                    ", or by {mm:.3} mm if the target is as was said and the rig is scaled"
+                ))
             ),
             Judgement::Exchanged => {
                 "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
@@ -114,7 +117,8 @@ impl Judgement {
                  `--square-mm` that is not in mm",
             ),
             Judgement::Contradicts(changed) if changed.explanations.iter().any(|e| e.cause == Cause::Pitch) => Some(
-                "check `--square-mm` and `--squares` against the target; if they are right, the rig changed: `stereocal camera-check IMAGES`",
+                "check `--square-mm` and `--squares` against the target; if they are right, the rig changed, or its own board's squares were not as was said: \
+                 `stereocal camera-check IMAGES --square-mm MM`",
             ),
             Judgement::Exchanged => Some("exchange the names of left/ and right/"),
             Judgement::Mirrored(_) => Some(
