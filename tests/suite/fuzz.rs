@@ -5,8 +5,8 @@ mod harness;
 
 use crate::run::workplace;
 
-/// Mutated files for each reader; the long run has a hundred times as many.
-const RUNS: usize = 500;
+/// Mutated files for each reader; the long run has three hundred times as many.
+const RUNS: usize = 160;
 
 #[test]
 fn no_reader_panics() {

@@ -17,16 +17,16 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
     let simulate =
         ["simulate", "--preset", "small", "--size", "800", "--check-pairs", "10", "--samples", "0", "--out", "."];
     done(world, &[&simulate[..], &["--verify", "0"]].concat());
-    let page_of = |board: &str, out: &str| {
-        let output = stereocal(world, &["camera-check", "check/", "--board", board, "--out", out]);
+    let page_of = |from: &[&str], board: &str, out: &str| {
+        let output = stereocal(world, &[&["camera-check", "--board", board, "--out", out], from].concat());
         let page = std::fs::read_to_string(world.join(out).join("camera-check.html")).unwrap();
         (stdout(&output), page)
     };
-    let (said, page) = page_of("checker:20x20:10", "as-it-is");
+    let (said, page) = page_of(&["check/"], "checker:20x20:10", "as-it-is");
     let headings = ["What happened during the series", "What was found of the board"];
     assert!(!said.contains("during the series") && headings.iter().all(|heading| !page.contains(heading)), "{said}");
     for (side, ratio) in [("10x9.94", "not 1.0060 times"), ("10x9.8", "not 1.0204 times")] {
-        let (said, page) = page_of(&format!("checker:20x20:{side}"), side);
+        let (said, page) = page_of(&["--corners", "as-it-is/corners.csv"], &format!("checker:20x20:{side}"), side);
         assert!(said.contains("1.0000 times as wide as high") && said.contains(ratio), "{said}");
         let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{side}: no `{text}`"));
         assert!(at(headings[1]) < at("Checks that are not passed") && !page.contains(headings[0]), "{side}");
@@ -78,13 +78,13 @@ fn one_page_of_the_day() {
             "--preset",
             "small",
             "--size",
-            "960",
+            "720",
             "--check-pairs",
             "10",
             "--samples",
-            "24",
+            "16",
             "--verify",
-            "6",
+            "4",
             "--out",
             ".",
         ],

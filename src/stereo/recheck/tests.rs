@@ -86,7 +86,7 @@ fn a_pair_that_contradicts_the_others_is_named() {
 #[test]
 fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
     // Boards that hardly lean leave lens and place of the cameras in a bent valley.
-    const WORLDS: u64 = 4;
+    const WORLDS: u64 = 2;
     for (leaning, turn_deg) in [(0.3, 0.03), (1.0, 0.03)] {
         let (mut alarms, mut seen) = (Vec::new(), 0);
         for seed in 60..60 + WORLDS {
@@ -102,8 +102,8 @@ fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
             seen +=
                 u64::from(recheck(&before, &world.corners_by_hand(seed + 1000, turn_deg)).unwrap().change.is_some());
         }
-        assert!(alarms.len() <= 1, "{leaning} {turn_deg} deg: {alarms:?}");
-        assert!(seen >= WORLDS - 1, "{leaning} {turn_deg} deg: {seen} of {WORLDS} turns of twice what is seen");
+        assert!(alarms.is_empty(), "{leaning} {turn_deg} deg: {alarms:?}");
+        assert!(seen == WORLDS, "{leaning} {turn_deg} deg: {seen} of {WORLDS} turns of twice what is seen");
     }
 }
 
@@ -113,15 +113,14 @@ fn pairs_that_contradict_each_other_tell_no_absurd_change() {
     // worlds the pairs' own rig has a focal length that is 4 % off.
     for seed in 87..90 {
         let before = by_hand(seed, 20, 1.0, 0.05);
-        for apart_deg in [0.1, 0.2] {
-            let mut world = World::new(3, seed + 1000);
-            leaning_by(&mut world, 0.3);
-            let mut corners = world.corners_by_hand(seed + 1000, 0.05);
-            corners.pairs[0] = world.corners_by_hand(seed + 2000, apart_deg).pairs.swap_remove(0);
-            let found = recheck(&before, &corners).unwrap();
-            let yaw = found.causes.iter().find(|c| c.cause == Cause::Yaw).unwrap();
-            assert!(yaw.amount.abs() < 3.0 * apart_deg, "{seed}, {apart_deg} deg apart: {}", found.statement());
-        }
+        let apart_deg = [0.1, 0.2][seed as usize % 2];
+        let mut world = World::new(3, seed + 1000);
+        leaning_by(&mut world, 0.3);
+        let mut corners = world.corners_by_hand(seed + 1000, 0.05);
+        corners.pairs[0] = world.corners_by_hand(seed + 2000, apart_deg).pairs.swap_remove(0);
+        let found = recheck(&before, &corners).unwrap();
+        let yaw = found.causes.iter().find(|c| c.cause == Cause::Yaw).unwrap();
+        assert!(yaw.amount.abs() < 3.0 * apart_deg, "{seed}, {apart_deg} deg apart: {}", found.statement());
     }
 }
 

@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn pictures_of_two_moments_tell_their_lenses() {
-        const WORLDS: u64 = 3;
+        const WORLDS: u64 = 2;
         let options = Options { lens: Some(Lens::Brown5), shape: Some(false), known: None };
         let (mut off, mut count, mut link) = (0.0, 0.0, 0.0);
         for turn_deg in [0.02, 0.1] {

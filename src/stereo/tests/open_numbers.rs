@@ -31,24 +31,23 @@ fn with_cut(mut corners: Corners, pairs: &[(usize, [usize; 2], [usize; 2])]) -> 
 
 #[test]
 fn what_one_picture_leaves_open_the_other_one_tells_on_the_rig_of_the_other_pairs() {
-    for seed in 0..3 {
-        let world = World::new(10, seed);
-        let whole = world.corners(seed + 20);
-        for lacks in [[1, 0], [0, 1], [3, 0], [2, 2], [4, 1]] {
-            // Cut in one picture, in the other, and in both but not alike.
-            let cases = [(2, lacks, [0, 0]), (5, [0, 0], lacks), (7, [lacks[0], 0], [0, lacks[1]])];
-            let corners = open_numbers::by_other_pairs(with_cut(whole.clone(), &cases), &BROWN4);
-            assert!(corners.open.is_empty() && corners.skipped.is_empty(), "{lacks:?}");
-            for (known, pair) in whole.pairs.iter().zip(&corners.pairs) {
-                assert_eq!(known.pair, pair.pair);
-                for (known, list) in [(&known.left, &pair.left), (&known.right, &pair.right)] {
-                    assert!(list.iter().all(|c| known.contains(c)), "{lacks:?}, pair {}: a wrong number", pair.pair);
-                }
+    let seed = 0;
+    let world = World::new(10, seed);
+    let whole = world.corners(seed + 20);
+    for lacks in [[1, 0], [0, 1], [3, 0], [2, 2], [4, 1]] {
+        // Cut in one picture, in the other, and in both but not alike.
+        let cases = [(2, lacks, [0, 0]), (5, [0, 0], lacks), (7, [lacks[0], 0], [0, lacks[1]])];
+        let corners = open_numbers::by_other_pairs(with_cut(whole.clone(), &cases), &BROWN4);
+        assert!(corners.open.is_empty() && corners.skipped.is_empty(), "{lacks:?}");
+        for (known, pair) in whole.pairs.iter().zip(&corners.pairs) {
+            assert_eq!(known.pair, pair.pair);
+            for (known, list) in [(&known.left, &pair.left), (&known.right, &pair.right)] {
+                assert!(list.iter().all(|c| known.contains(c)), "{lacks:?}, pair {}: a wrong number", pair.pair);
             }
-            assert!(corners.notes.iter().any(|note| note.contains("02, 05, 07")), "{:?}", corners.notes);
-            let rig = calibrate(&whole, &BROWN4).unwrap();
-            assert_eq!(open_numbers::by_rig(with_cut(whole.clone(), &cases), rig.rig()).pairs, corners.pairs);
         }
+        assert!(corners.notes.iter().any(|note| note.contains("02, 05, 07")), "{:?}", corners.notes);
+        let rig = calibrate(&whole, &BROWN4).unwrap();
+        assert_eq!(open_numbers::by_rig(with_cut(whole.clone(), &cases), rig.rig()).pairs, corners.pairs);
     }
 }
 

@@ -145,7 +145,7 @@ fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
 #[test]
 fn four_pairs_scatter_about_their_rig_as_far_as_many_do() {
     let excess = |pairs: usize, turn_deg: f64| {
-        const WORLDS: u64 = 5;
+        const WORLDS: u64 = 3;
         let of =
             |seed| pair_excess(&calibrate(&World::new(pairs, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap());
         (700..700 + WORLDS).map(|seed| of(seed).ln()).sum::<f64>() / WORLDS as f64

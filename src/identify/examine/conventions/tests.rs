@@ -48,22 +48,21 @@ fn shifted(rows: &[Measurement], by: impl Fn(usize) -> f64) -> Vec<Measurement> 
 
 #[test]
 fn what_a_fit_swallows_where_joints_move_little_is_named() {
-    for seed in 1..3 {
-        let (world, rows) = one_sphere(8.0, seed);
-        let robot = &world.nominal;
-        assert_eq!(said(&rows, robot), [""; 0], "clean, seed {seed}");
-        for (wrong, word) in [
-            (joints(&rows, |q| q.swap(4, 5)), "joints 5 and 6 are exchanged"),
-            (joints(&rows, |q| q.swap(3, 5)), "joints 4 and 6 are exchanged"),
-            (joints(&rows, |q| q[3] = -q[3]), "joint 4 is counted the other way round"),
-            (joints(&rows, |q| q[4] = -q[4]), "joint 5 is counted the other way round"),
-            (joints(&rows, |q| q[4] -= 90.0), "joint 5 is offset by 90"),
-            (joints(&rows, |q| q[3] += 180.0), "joint 4 is offset by"),
-            (late(&rows), "the joints lag 1 row"),
-        ] {
-            let said = said(&wrong, robot);
-            assert!(said.len() == 1 && said[0].contains(word), "{word}, seed {seed}: {said:?}");
-        }
+    let seed = 1;
+    let (world, rows) = one_sphere(8.0, seed);
+    let robot = &world.nominal;
+    assert_eq!(said(&rows, robot), [""; 0], "clean, seed {seed}");
+    for (wrong, word) in [
+        (joints(&rows, |q| q.swap(4, 5)), "joints 5 and 6 are exchanged"),
+        (joints(&rows, |q| q.swap(3, 5)), "joints 4 and 6 are exchanged"),
+        (joints(&rows, |q| q[3] = -q[3]), "joint 4 is counted the other way round"),
+        (joints(&rows, |q| q[4] = -q[4]), "joint 5 is counted the other way round"),
+        (joints(&rows, |q| q[4] -= 90.0), "joint 5 is offset by 90"),
+        (joints(&rows, |q| q[3] += 180.0), "joint 4 is offset by"),
+        (late(&rows), "the joints lag 1 row"),
+    ] {
+        let said = said(&wrong, robot);
+        assert!(said.len() == 1 && said[0].contains(word), "{word}, seed {seed}: {said:?}");
     }
 }
 

