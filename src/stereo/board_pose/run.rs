@@ -193,10 +193,12 @@ impl<'a> Run<'a> {
         let moves = present.iter().filter_map(|&i| {
             Some((found.values.poses[i]?.translation.vector - self.starts[i].pose?.translation.vector).norm())
         });
+        let share = (amount / (1.0 + amount)).abs();
+        let if_scaled = present.iter().filter_map(|&i| Some(share * found.values.poses[i]?.translation.vector.norm()));
         let explanation = Explanation { cause: Cause::Pitch, amount, sigma, fall: f64::INFINITY, grows: false };
         let moves_mm = median(moves).unwrap_or(0.0);
-        let explanations = vec![explanation];
-        Some(Judgement::Contradicts(Changed { explanations, moves_mm, beyond: f64::INFINITY, scaled_mm: None }))
+        let (explanations, scaled_mm) = (vec![explanation], median(if_scaled));
+        Some(Judgement::Contradicts(Changed { explanations, moves_mm, beyond: f64::INFINITY, scaled_mm }))
     }
 
     /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.

@@ -14,6 +14,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::hypothesis::{any_place, refocused};
 use super::series::{Linear, PLACES_FROM};
 use super::{Along, Finding, Kind};
+use crate::diagnostic::two_digits;
 use crate::imaging::Side;
 use crate::statistics::median;
 use crate::stereo::Lens;
@@ -113,7 +114,7 @@ fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
              {deg:.2} deg; "
         )
     });
-    let [left_px, right_px] = calibration.alone_px;
+    let [left_px, right_px] = calibration.alone_px.map(two_digits);
     Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
@@ -121,7 +122,7 @@ fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
         unit: if size.is_some() { "mm" } else { "px" },
         action: format!(
             "the pictures of the pairs were not taken at one moment: {otherwise}half of the pairs miss the rig by {:.2} px and more, the left camera alone \
-             its pictures by {left_px:.2} px and the right one by {right_px:.2} px; the worst are {}",
+             its pictures by {left_px} px and the right one by {right_px} px; the worst are {}",
             misfit.usual_px,
             misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
         ),
