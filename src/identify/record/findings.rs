@@ -11,6 +11,7 @@ use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::pattern;
 use crate::identify::judge::scale::CommonScale;
+use crate::identify::judge::uncertainty::stated_mm;
 use crate::identify::record::file::Smooth;
 use crate::identify::record::{left_out, misfits, plausible, rounded};
 use crate::identify::run::Identification;
@@ -325,11 +326,7 @@ const FAR_BELOW: f64 = 0.8;
 
 /// Whether the covariances of the file are far from what was seen.
 fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
-    let stated: Vec<f64> = set.poses.iter().filter_map(|p| p.reading.variance_mm2()).collect();
-    if stated.is_empty() {
-        return None;
-    }
-    let stated_mm = (stated.iter().sum::<f64>() / stated.len() as f64).sqrt();
+    let stated_mm = stated_mm(set)?;
     let scatter = &found.scatter;
     let whole_mm = (stated_mm.powi(2) * scatter.stated + scatter.point_mm.powi(2)).sqrt();
     if whole_mm < FAR_BELOW * stated_mm {
