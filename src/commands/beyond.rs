@@ -88,15 +88,15 @@ fn joints_outside(ranges: &[(f64, f64)], robot: &Robot, readings: &[&[f64]], nou
 }
 
 /// That targets are where a robot was not identified, and whether one of its joints but the first is farther outside of its range than the range is
-/// wide. What was found over a range says of places so far beyond it what a short line says of a far point; the first joint turns the whole arm, and
-/// its own range tells nothing of the others' links.
+/// wide. What was found over a range says of places so far beyond it what a short line says of a far point; the first joint turns the whole arm, with
+/// what its links are off by, unless terms go by its own angle.
 pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Option<(String, bool)> {
     let ranges = known::identified_over(file, robot)?;
     let joints = joints_outside(&ranges, robot, readings, "target");
     let is_far = |&(joint, _): &(usize, String)| {
         let (low, high) = ranges[joint];
         let is_far = |q: &&[f64]| off(&robot.joints[joint], (low, high), q[joint]).is_some_and(|off| off > high - low);
-        joint > 0 && readings.iter().any(is_far)
+        (joint > 0 || robot.corrections.follow(joint)) && readings.iter().any(is_far)
     };
     let far = joints.iter().any(is_far);
     let said: Vec<String> = joints.into_iter().map(|(_, said)| said).collect();

@@ -5,6 +5,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use crate::identify::data::dataset::{Dataset, Pose};
+use crate::identify::finding::Finding;
 use crate::identify::judge::errors::{Judge, Spread};
 use crate::identify::record::findings::{Findings, findings};
 use crate::identify::record::quality;
@@ -293,14 +294,16 @@ fn a_row_that_is_a_little_off_is_named_though_it_is_fitted_and_a_verify_row_too(
 #[test]
 fn readings_of_another_scale_are_said_to_be_so() {
     let world = synthetic::world(120, NOISE_MM, 8);
-    for (scale, said) in [(1.0, false), (0.95, true), (1.05, true)] {
+    // Links that are farther off than robots are built are not another robot's where one scale explains them all.
+    for (scale, counts) in [(1.0, (0, 0)), (0.98, (0, 1)), (0.95, (1, 0)), (1.05, (1, 0)), (1.25, (1, 0))] {
         let mut rows = world.rows.clone();
         rows.iter_mut().for_each(|row| *synthetic::point(row) *= scale);
         let (set, found) = world.identified(&rows);
         let cause = (Vec::new(), None);
         let findings = Findings::new(Vec::new(), cause, Vec::new(), &Default::default(), &set, &found);
-        let doubt = findings.doubts.iter().any(|f| f.finding.contains("all links are found"));
-        assert_eq!(doubt, said, "{scale}: {findings:?}");
+        let said = |list: &[Finding]| list.iter().filter(|f| f.finding.contains("all links are found")).count();
+        assert_eq!((said(&findings.against), said(&findings.doubts)), counts, "{scale}: {findings:?}");
+        assert_eq!(findings.against.len(), counts.0, "{scale}: {findings:?}");
     }
 }
 

@@ -159,6 +159,12 @@ impl Corrections {
         weights && self.harmonics.is_empty() && self.wobble.is_empty() && self.couplings.is_empty()
     }
 
+    /// Whether any goes by the angle of this joint, which says nothing of it at angles far from where it was found.
+    pub fn follow(&self, joint: usize) -> bool {
+        let is_wave = self.harmonics.iter().chain(&self.wobble).any(|t| t.joint == joint);
+        is_wave || self.couplings.iter().any(|t| t.of == joint)
+    }
+
     /// Whether a joint's link tilts.
     pub fn tilts(&self, joint: usize) -> bool {
         self.bending.iter().any(|t| t.joint == joint) || self.wobble.iter().any(|t| t.joint == joint)

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use camino::Utf8Path;
 use stereocal::files::provenance::Digested;
+use stereocal::robot::corrections::{HarmonicTerm, Wave};
 use stereocal::robot::{Advice, Check, Robot, catalogue, file, inverse};
 
 use crate::run::{stderr, stdout, stereocal, workplace};
@@ -662,7 +663,7 @@ fn targets_of_a_robot_whose_joints_were_mended_are_refused() {
 #[test]
 fn targets_far_outside_of_the_ranges_of_the_identification_are_said() {
     let folder = workplace();
-    let (nominal, _) = robots(folder.path());
+    let (nominal, real) = robots(folder.path());
     let postures = postures(&nominal, 12);
     std::fs::write(folder.path().join("targets.csv"), csv(&postures)).unwrap();
     let known = |ranges: &[[f64; 2]]| {
@@ -682,8 +683,43 @@ fn targets_far_outside_of_the_ranges_of_the_identification_are_said() {
             && said.contains("joint 1 in "),
         "{said}"
     );
+    // A term that goes by its angle is.
+    let wave = HarmonicTerm { joint: 0, wave: Wave::Sin, amplitude_rad: 1e-4 };
+    let mut wavy = real.clone();
+    wavy.corrections.harmonics.push(wave);
+    std::fs::write(folder.path().join("identified.toml"), file::to_toml(&wavy)).unwrap();
+    let said = run(folder.path(), &["targets.csv", "--force"], 1);
+    assert!(said.contains("nothing says how far off it is there") && said.contains("joint 1 in "), "{said}");
+    std::fs::write(folder.path().join("identified.toml"), file::to_toml(&real)).unwrap();
     ranges[2] = [10.0, 12.0];
     known(&ranges);
     let said = run(folder.path(), &["targets.csv", "--force"], 1);
     assert!(said.contains("nothing says how far off it is there") && said.contains("joint 3 in "), "{said}");
+}
+
+#[test]
+fn limits_of_either_file_count_and_where_neither_has_any_both_are_named() {
+    let folder = workplace();
+    let (nominal, real) = robots(folder.path());
+    let write = |name: &str, robot: &Robot| std::fs::write(folder.path().join(name), file::to_toml(robot)).unwrap();
+    let without = |robot: &Robot| {
+        let mut robot = robot.clone();
+        robot.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
+        robot
+    };
+    std::fs::write(folder.path().join("targets.csv"), csv(&postures(&nominal, 3))).unwrap();
+    write("identified.toml", &without(&real));
+    assert!(!run(folder.path(), &["targets.csv"], 0).contains("limits of joint"));
+    // They are kept to.
+    write("robot.toml", &nominal.within(&[(-0.01, 0.01); 6]));
+    let said = run(folder.path(), &["targets.csv", "--force"], 1);
+    assert!(said.contains("0 of 3 targets compensated") && !said.contains("limits of joint"), "{said}");
+    write("robot.toml", &without(&nominal));
+    let said = run(folder.path(), &["targets.csv", "--force"], 0);
+    assert!(said.contains("neither robot.toml nor identified.toml has limits of joint 1, 2, 3, 4, 5, 6:"), "{said}");
+    // One joint is open in one of them alone.
+    let mut one = without(&real);
+    one.joints[3].limits_rad = Some((-6.3, 6.3));
+    write("identified.toml", &one);
+    assert!(run(folder.path(), &["targets.csv", "--force"], 0).contains("has limits of joint 1, 2, 3, 5, 6:"));
 }

@@ -91,8 +91,8 @@ pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<Stri
     })
 }
 
-/// Warns of joint targets that look like radians in degrees, and of joints that have no limits.
-pub(super) fn warn(rows: &[Row], robot: &Robot) {
+/// Warns of joint targets that look like radians in degrees, and of joints of which neither file, each with its robot, has the limits.
+pub(super) fn warn(rows: &[Row], [(drawn, nominal), (found, robot)]: [(&Utf8Path, &Robot); 2]) {
     let turning = |row: &Row| -> Option<Vec<f64>> {
         let readings = row.given.as_ref().filter(|_| matches!(row.target, Target::Readings(_)))?;
         Some(readings.iter().zip(&robot.joints).filter(|(_, joint)| !joint.slides).map(|(q, _)| *q).collect())
@@ -106,11 +106,12 @@ pub(super) fn warn(rows: &[Row], robot: &Robot) {
             "no joint of these targets is farther than {most_deg:.3} deg from zero: are they radians? A table says so by columns `j1_rad`.."
         ));
     }
-    let open = robot.joints_without_limits();
+    let of_nominal = nominal.joints_without_limits();
+    let open: Vec<String> = robot.joints_without_limits().into_iter().filter(|j| of_nominal.contains(j)).collect();
     if !open.is_empty() {
         progress::note(format!(
-            "the robot file has no limits of joint {}: two turns either way are taken where a joint turns; `limits_deg` (`limits_mm`) says what \
-             the real arm can",
+            "neither {drawn} nor {found} has limits of joint {}: two turns either way are taken where a joint turns; `limits_deg` (`limits_mm`) in \
+             either says what the real arm can",
             open.join(", ")
         ));
     }

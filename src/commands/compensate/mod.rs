@@ -50,7 +50,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     let out = out.for_run(&run, &inputs.collect::<Vec<&Utf8Path>>());
     out.check_free(&["compensated.csv", "compensate.json"])?;
     tell_of_postures(&rows);
-    doubts::warn(&rows, &pair.identified);
+    doubts::warn(&rows, [(&args.robot, nominal), (&args.identified, &pair.identified)]);
     let found = compensated(args, &pair, &rows);
     let in_file = |readings: &[f64]| -> Vec<f64> {
         readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()

@@ -32,6 +32,9 @@ const GIVE_OR_TAKE: f64 = 4.0;
 /// Standard deviations of a scale before the data: instruments, typing errors, units.
 const SCALES: [f64; 4] = [0.003, 0.01, 0.03, 0.1];
 
+/// Standard deviations of what one link alone is off by, mm: another size of the arm, a digit of the data sheet.
+const ONE_LINK_MM: [f64; 2] = [10.0, 100.0];
+
 /// Logarithm of the odds from which on a scale is told of, twelve to one: none of 600 clean simulated sets has as much.
 const SIGNIFICANT: f64 = 2.5;
 
@@ -45,7 +48,7 @@ pub struct CommonScale {
     pub share: f64,
     /// What the links' tolerance lets it be known to: a standard deviation.
     pub sigma: f64,
-    /// Logarithm of how many times more probable the links are with it.
+    /// Logarithm of how many times more probable the links are with it than without, be one of them off or none.
     pub log_odds: f64,
     /// The share that the readings may be off by and nothing would show it: in 1 of 100 cases it is larger.
     pub unseen: f64,
@@ -66,12 +69,17 @@ impl CommonScale {
             _ => 0.0,
         };
         let extras = &formulation.rows.extras;
-        let longer = base.coordinates(&(0..parameters.len()).map(length).collect::<Vec<f64>>());
-        let longer = DVector::from_vec(longer).resize_vertically(base.rank() + extras.len(), 0.0);
+        let moved = |by: &dyn Fn(usize) -> f64| {
+            let of_base = base.coordinates(&(0..parameters.len()).map(by).collect::<Vec<f64>>());
+            DVector::from_vec(of_base).resize_vertically(base.rank() + extras.len(), 0.0)
+        };
+        let is_link = |i: &usize| matches!(parameters[*i], Parameter::A(_) | Parameter::D(_)) && !base.zero.contains(i);
+        let links = (0..parameters.len()).filter(is_link).map(|link| moved(&|i| f64::from(i == link)));
+        let (longer, links) = (moved(&length), links.collect::<Vec<_>>());
         let (normal, gradient) = formulation.normal();
         let weighed = |(lengths_mm, before): (f64, f64)| {
             let tolerance = Tolerance { lengths_mm, target_mm: MOUNTED_MM, ..formulation.tolerance };
-            Weighed::new(&tolerance.covariance(base, parameters, extras), &normal, &gradient, &longer, before)
+            Weighed::new(&tolerance.covariance(base, parameters, extras), &normal, &gradient, (&longer, &links), before)
         };
         let all: Vec<Weighed> = tolerances().filter_map(weighed).collect();
         let found = summed_up(&all, if set.known.is_empty() { "readings" } else { "known distances" });
@@ -111,6 +119,8 @@ fn tolerances() -> impl Iterator<Item = (f64, f64)> {
 /// The links' errors under one tolerance.
 struct Weighed {
     log_evidence: f64,
+    /// The same with one link, whichever, off by more than the tolerance.
+    of_one_link: f64,
     precision: f64,
     pull: f64,
 }
@@ -120,7 +130,7 @@ impl Weighed {
         covariance: &DMatrix<f64>,
         normal: &DMatrix<f64>,
         gradient: &DVector<f64>,
-        longer: &DVector<f64>,
+        (longer, links): (&DVector<f64>, &[DVector<f64>]),
         before: f64,
     ) -> Option<Weighed> {
         // What is measured of the links scatters by the tolerance and the noise: with N = J'J and C the tolerance, its weight is
@@ -128,8 +138,15 @@ impl Weighed {
         let (lu, log_determinant) = weighed(normal, covariance);
         let seen = lu.solve(gradient)?;
         let of_longer = lu.solve(&(normal * longer))?;
+        let log_evidence = before + 0.5 * (gradient.dot(&(covariance * &seen)) - log_determinant);
+        let of_link = |link: &DVector<f64>| {
+            let precision = link.dot(&lu.solve(&(normal * link))?);
+            Some(ONE_LINK_MM.map(|sd_mm| gain(-link.dot(&seen), precision, sd_mm)))
+        };
+        let gains = links.iter().map(of_link).collect::<Option<Vec<_>>>()?.concat();
         Some(Weighed {
-            log_evidence: before + 0.5 * (gradient.dot(&(covariance * &seen)) - log_determinant),
+            log_evidence,
+            of_one_link: log_evidence + log_sum(gains.iter().copied()) - (gains.len() as f64).ln(),
             precision: longer.dot(&of_longer),
             pull: -longer.dot(&seen),
         })
@@ -143,18 +160,21 @@ impl Weighed {
     /// factor that all tolerances share.
     fn gain(&self, scale: f64) -> f64 {
         match scale.is_finite() {
-            true => {
-                0.5 * (self.pull.powi(2) / (self.precision + scale.powi(-2))
-                    - (1.0 + scale * scale * self.precision).ln())
-            }
+            true => gain(self.pull, self.precision, scale),
             false => 0.5 * (self.pull.powi(2) / self.precision - self.precision.ln()),
         }
     }
 }
 
+/// Logarithm of the factor by which another unknown of this standard deviation makes the data more probable.
+fn gain(pull: f64, precision: f64, sd: f64) -> f64 {
+    0.5 * (pull.powi(2) / (precision + sd.powi(-2)) - (1.0 + sd * sd * precision).ln())
+}
+
 /// What all tolerances together say of a scale, each with its weight.
 fn summed_up(weighed: &[Weighed], of: &'static str) -> CommonScale {
-    let without = log_sum(weighed.iter().map(|w| w.log_evidence));
+    let without = [|w: &Weighed| w.log_evidence, |w: &Weighed| w.of_one_link];
+    let without = without.map(|log| log_sum(weighed.iter().map(log))).into_iter().fold(f64::NEG_INFINITY, f64::max);
     let with = |scale: f64| log_sum(weighed.iter().map(|w| w.log_evidence + w.gain(scale)));
     let log_odds = SCALES.iter().map(|&s| with(s) - without).fold(f64::NEG_INFINITY, f64::max);
     // With any scale as probable as any other.
@@ -190,32 +210,59 @@ fn log_sum(logs: impl Iterator<Item = f64> + Clone) -> f64 {
 mod tests {
     use super::*;
 
-    /// Links of 50 to 400 mm, found exactly, off by errors of about `error_mm` and by a share.
-    fn of_links(error_mm: f64, share: f64) -> CommonScale {
-        let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
-        let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
-        let longer = DVector::from_row_slice(&lengths);
-        let normal = DMatrix::<f64>::identity(5, 5) * 1e4;
-        let gradient = DVector::from_fn(5, |k, _| -1e4 * (errors[k] + share * lengths[k]));
+    /// Links of these lengths, mm, found exactly and off by so much.
+    fn of_links(lengths: &[f64], off_mm: &[f64]) -> CommonScale {
+        let count = lengths.len();
+        let longer = DVector::from_row_slice(lengths);
+        let normal = DMatrix::<f64>::identity(count, count) * 1e4;
+        let gradient = DVector::from_row_slice(off_mm) * -1e4;
+        let links: Vec<DVector<f64>> = normal.column_iter().map(|column| column / 1e4).collect();
         let weighed = |(mm, before): (f64, f64)| {
-            Weighed::new(&(DMatrix::identity(5, 5) * mm * mm), &normal, &gradient, &longer, before).unwrap()
+            let tolerance = DMatrix::identity(count, count) * mm * mm;
+            Weighed::new(&tolerance, &normal, &gradient, (&longer, &links), before).unwrap()
         };
-        let all: Vec<Weighed> = tolerances().map(weighed).collect();
-        summed_up(&all, "readings")
+        summed_up(&tolerances().map(weighed).collect::<Vec<Weighed>>(), "readings")
     }
 
     #[test]
     fn a_scale_shows_where_it_is_larger_than_the_links_errors_make_it_by_chance() {
+        let lengths = [400.0, -300.0, 250.0, 100.0, 50.0];
         for (error_mm, share, told) in
             [(0.5, 0.0, false), (0.5, 0.001, false), (0.5, 0.01, true), (5.0, 0.01, false), (0.02, -0.001, true)]
         {
-            let CommonScale { log_odds, share: found, sigma, unseen, .. } = of_links(error_mm, share);
+            let errors = [0.9, 1.2, -0.7, -1.1, 0.8].map(|e| e * error_mm);
+            let off_mm: Vec<f64> = errors.iter().zip(lengths).map(|(error, length)| error + share * length).collect();
+            let CommonScale { log_odds, share: found, sigma, unseen, .. } = of_links(&lengths, &off_mm);
             assert!(
                 unseen > found.abs() + 2.0 * sigma && unseen < found.abs() + 5.0 * sigma,
                 "{found} {sigma} {unseen}"
             );
             assert_eq!(log_odds > SIGNIFICANT, told, "{error_mm} {share}: {log_odds} {found}");
             assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
+        }
+    }
+
+    /// An arm of two long links, of which half of what one is off by is a scale of both.
+    #[test]
+    fn one_link_that_is_off_is_no_scale_of_all() {
+        let lengths = [400.0, 400.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let built_mm = [0.2, -0.3, 0.3, -0.2, 0.25, -0.35, 0.1, 0.3, -0.3, 0.2, -0.15, 0.28];
+        for (first_mm, second_mm, told) in [
+            (-20.0, 0.0, false),
+            (0.0, -20.0, false),
+            (-3.0, 0.0, false),
+            (-200.0, 0.0, false),
+            (-20.0, -5.0, false),
+            (-20.0, 12.0, false),
+            (0.0, 0.0, false),
+            (-20.0, -20.0, true),
+            (2.0, 2.0, true),
+        ] {
+            let mut off_mm = built_mm;
+            off_mm[0] += first_mm;
+            off_mm[1] += second_mm;
+            let found = of_links(&lengths, &off_mm);
+            assert_eq!(found.is_significant(), told, "{first_mm} {second_mm}: {found:?}");
         }
     }
 }

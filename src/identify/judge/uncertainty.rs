@@ -53,6 +53,10 @@ pub struct Expected {
     /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, repeatability, and smooth errors that
     /// the points of a placement share.
     pub scatter_mm: f64,
+    /// Standard deviation that readings state of a coordinate, or of a distance, as the fit took them, mm: it is in none of these. `None` where they
+    /// state none, and the scatter is theirs, too.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stated_mm: Option<f64>,
     /// Degrees of freedom by which the residuals tell how large they are.
     pub freedom: f64,
     /// For which poses it is said.
@@ -114,6 +118,7 @@ impl Expected {
             max_mm,
             of_robot_mm: Lengths::new(&of_rows(&of_robots), told).mean_mm,
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
+            stated_mm: stated_mm(set).map(|mm| mm * formulation.rows.scatter.stated.sqrt()),
             freedom: formulation.rows.scatter.freedom,
             poses: region(set),
             joint_ranges: ranges(set),
@@ -131,11 +136,24 @@ impl Expected {
 
     /// What the mean of it is made of.
     pub fn parts(&self) -> String {
-        format!(
-            "that holds what readings scatter by ({:.4} mm: instrument, repeatability, what the model lacks); the parameters alone make {:.4} mm",
-            self.scatter_mm, self.of_robot_mm
-        )
+        let Expected { scatter_mm, of_robot_mm, .. } = self;
+        let alone = format!("the parameters alone make {of_robot_mm:.4} mm");
+        match self.stated_mm {
+            None => format!(
+                "that holds what readings scatter by ({scatter_mm:.4} mm: instrument, repeatability, what the model lacks); {alone}"
+            ),
+            Some(stated_mm) => format!(
+                "that holds what readings scatter by beyond their own covariances ({scatter_mm:.4} mm: repeatability, what the model lacks); {alone}; \
+                 readings are off by their own noise, too (standard deviation {stated_mm:.4} mm)"
+            ),
+        }
     }
+}
+
+/// Standard deviation that the readings state of a coordinate, or of a distance, mm.
+pub fn stated_mm(set: &Dataset) -> Option<f64> {
+    let stated: Vec<f64> = set.poses.iter().filter_map(|p| p.reading.variance_mm2()).collect();
+    (!stated.is_empty()).then(|| (stated.iter().sum::<f64>() / stated.len() as f64).sqrt())
 }
 
 /// Share of a row's own reading in what is predicted there, of which on more is not told from all of it.

@@ -7,8 +7,13 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::robot::Parameter;
+
 /// Coefficients below this are not written into a group's name.
 const NAMED: f64 = 1e-3;
+
+/// Those below this share no correction that matters.
+pub const NEGLIGIBLE: f64 = 0.02;
 
 /// Columns within this of the longest count as equally long, and the first of them is taken: names don't depend on rounding.
 const TIE: f64 = 1e-9;
@@ -133,6 +138,13 @@ impl Base {
         let others =
             self.dependent.iter().enumerate().map(|(column, &other)| (other, self.coefficients[(row, column)]));
         std::iter::once((self.free[row], 1.0)).chain(others.filter(|(_, c)| c.abs() >= least)).collect()
+    }
+
+    /// A correction of such a sum in words and the file's unit: `d_2 + d_3 + d_4 +20.4 mm`.
+    pub fn said(&self, row: usize, least: f64, parameters: &[Parameter], amount: f64) -> String {
+        let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
+        let (unit, factor) = parameters[self.free[row]].file_unit();
+        format!("{} {:+.1} {unit}", sum_name(&self.sum(row, least), &names), factor * amount)
     }
 
     /// Each base parameter that stands for others too, with them: `d_2 + d_3 + d_4`, `theta_6 - 2.5 v_x`.

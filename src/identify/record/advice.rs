@@ -239,12 +239,7 @@ impl Record {
             ));
         }
         if !self.widened.is_empty() {
-            // Of a sum nobody knows which of its parts is far off.
-            let sum_of = |name: &String| {
-                i.dependent.iter().find(|sum| sum.split(' ').next() == Some(name)).unwrap_or(name).clone()
-            };
-            let far = self.widened.iter().map(sum_of).collect::<Vec<String>>().join(", ");
-            list.push(format!("far from nominal: {far}; the search limits were widened"));
+            list.push(format!("far from nominal: {}; the search limits were widened", self.widened.join(", ")));
         }
         list
     }

@@ -94,7 +94,7 @@ pub struct Record {
     pub scatter_mm: f64,
     /// Scatter of a component of the orientation, rad, where orientations were used.
     pub scatter_rad: Option<f64>,
-    /// Parameters whose search limits were widened.
+    /// Parameters, or sums of them, whose search limits were widened, with what they are off by.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub widened: Vec<String>,
     /// The prior's standard deviations, where one was used.

@@ -10,6 +10,8 @@ use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
 use crate::identify::judge::pattern;
+use crate::identify::judge::scale::CommonScale;
+use crate::identify::judge::uncertainty::stated_mm;
 use crate::identify::record::file::Smooth;
 use crate::identify::record::{left_out, misfits, plausible, rounded};
 use crate::identify::run::Identification;
@@ -61,12 +63,13 @@ impl Findings {
         let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let many = many_left_out(set, found);
-        let against: Vec<Finding> = left_out
-            .into_iter()
-            .chain(of_rounding)
-            .chain(unexplained)
-            .chain(plausible::of_another_robot(found))
-            .collect();
+        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
+        // says nothing.
+        let (scale, other) = (scale(set, found).filter(|_| is_reached), plausible::of_another_robot(found));
+        // A scale that explains all links is why they are far off, and no other robot.
+        let (of_links, scale) = if other.is_some() { (scale.or(other), None) } else { (None, scale) };
+        let against: Vec<Finding> =
+            left_out.into_iter().chain(of_rounding).chain(unexplained).chain(of_links).collect();
         // What is said against the result of some rows need not be said of them twice.
         let is_told = |finding: &Finding| {
             let mut told = against.iter().chain(&many);
@@ -74,11 +77,6 @@ impl Findings {
         };
         let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
         let notes = noise.into_iter().chain(of_fit).filter(|finding| !is_told(finding)).collect();
-        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
-        // says nothing.
-        let scale = found.scale(set).filter(|scale| scale.is_significant() && is_reached).map(|scale| {
-            Finding::new(scale.sentence(), "the robot that was found has this scale; check it on a known length")
-        });
         // A scale makes every length another.
         let beyond = plausible::of_links(found).filter(|_| against.is_empty() && scale.is_none());
         let terms = plausible::of_terms(found);
@@ -122,6 +120,16 @@ fn left_out_of_a_joint(set: &Dataset, found: &Identification) -> Option<Finding>
     left_out::of_a_joint(set, found.robot(), &found.fitted, &found.outliers, &errors)
 }
 
+/// A scale of the readings that explains all links.
+fn scale(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let scale = found.scale(set).filter(CommonScale::is_significant)?;
+    plausible::is_explained_by(scale.share, found).then(|| {
+        let action = "the robot that was found has this scale; check it on a known length, and of cameras `--square-mm` of both boards, the target's and \
+                      the one that calibrated them";
+        Finding::new(scale.sentence(), action)
+    })
+}
+
 /// That so many rows were left out that the robot may be the others' only.
 fn many_left_out(set: &Dataset, found: &Identification) -> Option<Finding> {
     let is_many = found.formulation().is_some() && !few_left_out(found);
@@ -161,8 +169,12 @@ fn spread_mm(set: &Dataset, rows: &[usize]) -> f64 {
 
 /// What was found along the way: gross errors, sessions, drifts, covariances that are off.
 pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Finding> {
-    let of_fit = misfits::of_rows(set, found).into_iter().chain(plausible::of_another_robot(found));
-    of_fit.chain(of_sensor(found)).chain(along_the_rows(along)).chain(of_data(set, found)).collect()
+    misfits::of_rows(set, found)
+        .into_iter()
+        .chain(of_sensor(found))
+        .chain(along_the_rows(along))
+        .chain(of_data(set, found))
+        .collect()
 }
 
 /// Errors that the readings share.
@@ -314,11 +326,7 @@ const FAR_BELOW: f64 = 0.8;
 
 /// Whether the covariances of the file are far from what was seen.
 fn stated_covariances(set: &Dataset, found: &Identification) -> Option<String> {
-    let stated: Vec<f64> = set.poses.iter().filter_map(|p| p.reading.variance_mm2()).collect();
-    if stated.is_empty() {
-        return None;
-    }
-    let stated_mm = (stated.iter().sum::<f64>() / stated.len() as f64).sqrt();
+    let stated_mm = stated_mm(set)?;
     let scatter = &found.scatter;
     let whole_mm = (stated_mm.powi(2) * scatter.stated + scatter.point_mm.powi(2)).sqrt();
     if whole_mm < FAR_BELOW * stated_mm {

@@ -1,14 +1,14 @@
 //! Whether the parameters that were found are those of a built robot.
 
 use crate::identify::finding::Finding;
-use crate::identify::model::base::sum_name;
+use crate::identify::model::base::NEGLIGIBLE;
 use crate::identify::run::Identification;
 use crate::robot::{Parameter, Robot, Unit};
 use crate::statistics::median;
 
 /// Links that are farther from the file's than they are built.
 pub fn of_another_robot(found: &Identification) -> Option<Finding> {
-    let far = far(found, &link_limit, FAR_SIGMAS)?;
+    let far = far(found, &link_limit, FAR_SIGMAS, 0.0)?;
     Some(Finding::new(
         format!(
             "the links found are far from the nominal ones ({far}), farther than robots are built: the robot file may be of another robot"
@@ -19,13 +19,18 @@ pub fn of_another_robot(found: &Identification) -> Option<Finding> {
 
 /// Whether no link is farther from the file's than robots are built, be it known well or badly.
 pub fn are_of_the_file(found: &Identification) -> bool {
-    far(found, &link_limit, 0.0).is_none()
+    far(found, &link_limit, 0.0, 0.0).is_none()
+}
+
+/// Whether no link is farther off than robots are built once all of the file's are longer by this share.
+pub fn is_explained_by(share: f64, found: &Identification) -> bool {
+    far(found, &link_limit, FAR_SIGMAS, share).is_none()
 }
 
 /// Links that are farther from the file's than makers build them, though no other robot's: many times what the other lengths are off by, or more
 /// than any maker's.
 pub fn of_links(found: &Identification) -> Option<Finding> {
-    let each = sums(found, &|parameter| is_length(parameter).then_some(1.0));
+    let each = sums(found, &|parameter| is_length(parameter).then_some(1.0), 0.0);
     let usual_mm = median(each.iter().map(|sum| sum.amount.abs() / sum.limit))?;
     let length_mm = (MANY * usual_mm).clamp(COARSE_MM, NOBODYS_MM);
     let limit = |parameter: Parameter| match parameter {
@@ -33,7 +38,7 @@ pub fn of_links(found: &Identification) -> Option<Finding> {
         Parameter::Alpha(_) => Some(COARSE_MRAD),
         _ => link_limit(parameter),
     };
-    let far = far(found, &limit, FAR_SIGMAS)?;
+    let far = far(found, &limit, FAR_SIGMAS, 0.0)?;
     Some(Finding::new(
         format!(
             "links are found farther from the robot file's than makers build them ({far}; half of the lengths are within {usual_mm:.1} mm)"
@@ -49,7 +54,7 @@ fn is_length(parameter: Parameter) -> bool {
 
 /// Terms that are larger than those of built robots.
 pub fn of_terms(found: &Identification) -> Option<Finding> {
-    let far = far(found, &term_limit, FAR_SIGMAS)?;
+    let far = far(found, &term_limit, FAR_SIGMAS, 0.0)?;
     Some(Finding::new(
         format!(
             "terms found are implausibly large for gears, bearings and encoders ({far}): they may compensate another error, such as wrong \
@@ -58,9 +63,6 @@ pub fn of_terms(found: &Identification) -> Option<Finding> {
         "the robot that was found holds where it was measured only, until the reason is known",
     ))
 }
-
-/// Coefficients below this share no correction that matters.
-const NEGLIGIBLE: f64 = 0.02;
 
 /// How many standard deviations a correction must have to be far from nominal.
 const FAR_SIGMAS: f64 = 5.0;
@@ -114,10 +116,11 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
     }
 }
 
-/// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence.
-fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, sigmas: f64) -> Option<String> {
+/// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence. Of lengths it is the correction
+/// of the file's longer by this share.
+fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, sigmas: f64, share: f64) -> Option<String> {
     let is_far = |sum: &Sum| sum.amount.abs() > sum.limit && sum.amount.abs() > sigmas * sum.sigma;
-    let list: Vec<String> = sums(found, limit).into_iter().filter(is_far).map(|sum| sum.said).collect();
+    let list: Vec<String> = sums(found, limit, share).into_iter().filter(is_far).map(|sum| sum.said).collect();
     (!list.is_empty()).then(|| list.join(", "))
 }
 
@@ -132,23 +135,25 @@ struct Sum {
 }
 
 /// Those of which each part has a limit: a sum with the tool's place in it is the tool's.
-fn sums(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>) -> Vec<Sum> {
+fn sums(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, share: f64) -> Vec<Sum> {
     let Some(formulation) = found.formulation() else { return Vec::new() };
     let (covariance, nominal) = (formulation.robot_covariance(), &formulation.rows.kinematics.nominal);
     let (parameters, base) = (formulation.parameters(), &formulation.base);
-    let moved = |i: usize| found.robot().value(parameters[i]) - nominal.value(parameters[i]);
-    let names: Vec<String> = parameters.iter().map(|p| p.name()).collect();
+    let moved = |i: usize| {
+        let scale = if is_length(parameters[i]) { 1.0 + share } else { 1.0 };
+        found.robot().value(parameters[i]) - scale * nominal.value(parameters[i])
+    };
     // What poses determine of a link is the sum of it and what acts like it; terms are nothing else's.
     let sum = |row: usize| {
         let is_link = link_limit(parameters[base.free[row]]).is_some();
-        let parts = base.sum(row, if is_link { NEGLIGIBLE } else { f64::INFINITY });
+        let least = if is_link { NEGLIGIBLE } else { f64::INFINITY };
+        let parts = base.sum(row, least);
         let of = |f: &dyn Fn(usize) -> f64| parts.iter().map(|&(i, c)| c * f(i)).sum::<f64>();
         // Each may be off by its limit, and they are off independently.
         let limits = parts.iter().map(|&(i, c)| Some((c * limit(parameters[i])?).powi(2)));
         let limit = limits.sum::<Option<f64>>()?.sqrt();
         let (amount, variance) = (of(&moved), of(&|i| of(&|j| covariance[(i, j)])));
-        let (unit, factor) = parameters[parts[0].0].file_unit();
-        let said = format!("{} {:+.1} {unit}", sum_name(&parts, &names), factor * amount);
+        let said = base.said(row, least, parameters, amount);
         Some(Sum { said, amount, sigma: variance.max(0.0).sqrt(), limit })
     };
     (0..base.free.len()).filter_map(sum).collect()
@@ -183,8 +188,13 @@ mod tests {
             assert_eq!((record.advice, record.is_beyond), (Advice::Check, true), "{by}: {:?}", record.warnings);
             assert!(record.reason.contains(named), "{}", record.reason);
         }
-        // Farther, and it is another robot's.
-        assert_eq!(judged(Parameter::A(2), 20.0).advice, Advice::DoNotUse);
+        // Farther, and it is another robot's, not that of readings of another scale.
+        for parameter in [Parameter::A(2), Parameter::D(4)] {
+            let record = judged(parameter, 20.0);
+            assert_eq!(record.advice, Advice::DoNotUse, "{:?}", record.warnings);
+            assert!(record.reason.contains("another robot"), "{}", record.reason);
+            assert!(!record.warnings.iter().any(|said| said.contains("all links")), "{:?}", record.warnings);
+        }
     }
 
     #[test]

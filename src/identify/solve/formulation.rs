@@ -13,7 +13,7 @@ use super::scatter::estimate_scatter;
 use super::task::{FIRST_SCATTER_MM, Task, prior_rows};
 use super::trust_region;
 use crate::identify::Error;
-use crate::identify::model::base::Base;
+use crate::identify::model::base::{Base, NEGLIGIBLE};
 use crate::identify::model::prior::{Likelihood, Tolerance};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{Extra, Scatter};
@@ -35,6 +35,9 @@ const SAME_SCATTER: f64 = 0.01;
 /// A fit may end so far into the box before the box is widened.
 const NEAR_WALL: f64 = 0.95;
 
+/// Share (mrad a mm, where the others are angles) of a tool's place in a sum from which on the sum is as much the tool's.
+const ALIKE: f64 = 0.5;
+
 /// The written robot is the fitted one when moving the levers' chain moves no parameter by more, mm or mrad.
 const SAME_CHAIN: f64 = 1e-11;
 
@@ -50,7 +53,7 @@ pub struct Formulation {
     pub base: Base,
     /// Half-widths of the box, one a base parameter, mm and mrad.
     pub bounds: Vec<f64>,
-    /// Names of base parameters whose box is wider than asked for.
+    /// Base parameters that are farther off than their box was asked to be, with the amount.
     pub widened: Vec<String>,
     /// The prior's standard deviations.
     pub tolerance: Tolerance,
@@ -304,15 +307,18 @@ impl<'a> Estimate<'a> {
 
 fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings) -> (Vec<f64>, Vec<String>) {
     let mut widened = Vec::new();
-    let bound = |(&i, &value): (&usize, &f64)| {
-        let mut bound = match parameters[i].unit() {
+    let bound = |(row, &value): (usize, &f64)| {
+        let mut bound = match parameters[base.free[row]].unit() {
             Unit::Mm => settings.bound_mm,
             Unit::Mrad => 1000.0 * settings.bound_deg.to_radians(),
         };
         if settings.widen_bounds && value.abs() > NEAR_WALL * bound {
-            // A tool is typed off a drawing.
-            if !(matches!(parameters[i], Parameter::V(_)) && value.abs() <= TYPED_MM) {
-                widened.push(parameters[i].name());
+            // A tool is typed off a drawing, and what acts like it is not told from it.
+            let of_tool = |&(i, c): &(usize, f64)| matches!(parameters[i], Parameter::V(_)).then_some(c.abs());
+            let of_tool = base.sum(row, ALIKE).iter().find_map(of_tool);
+            if of_tool.is_none_or(|c| value.abs() > c * TYPED_MM) {
+                let whose = if of_tool.is_some() { " (the tool, `v_x` to `v_z`, or the last link)" } else { "" };
+                widened.push(base.said(row, NEGLIGIBLE, parameters, value) + whose);
             }
             while value.abs() > NEAR_WALL * bound {
                 bound *= 2.0;
@@ -320,7 +326,7 @@ fn bounds(base: &Base, parameters: &[Parameter], x: &[f64], settings: &Settings)
         }
         bound
     };
-    let bounds = base.free.iter().zip(x).map(bound).collect();
+    let bounds = x[..base.rank()].iter().enumerate().map(bound).collect();
     (bounds, widened)
 }
 

@@ -107,8 +107,8 @@ pub(in crate::measurements) fn unplaced(parts: &[Part], picked: &Picked, forced:
         return lacking(parts, &Picked { joints: picked.joints.clone(), ..Picked::default() }, count);
     }
     let hint = format!(
-        "{}`--columns` names the {} columns{} in their order: j1 to j{count} for the joints, x, y, z for the point, `-` for each that is neither; \
-         look at `--robot`, too: its file must be of this robot",
+        "{}see whether the file of `--robot` is of this robot; if it is, `--columns` names the {} columns{} in their order: j1 to j{count} for \
+         the joints, x, y, z for the point, `-` for each that is neither",
         lying(parts, count),
         parts.iter().map(Part::width_of_file).sum::<usize>(),
         side_by_side(parts)

@@ -184,10 +184,14 @@ fn what_is_far_off_is_said_of_the_sum_that_is_determined() {
         assert!(output.status.success(), "{}", stderr(&output));
         stderr(&output)
     };
-    for off_mm in [-60.0, 40.0, 200.0] {
-        assert!(said(off_mm).contains("far from nominal: d_6 + v_z;"), "{off_mm}: {}", said(off_mm));
+    for (off_mm, way) in [(-60.0, '+'), (-15.0, '+'), (40.0, '-'), (200.0, '-')] {
+        let (said, far) = (said(off_mm), format!("far from nominal: d_6 + v_z {way}"));
+        assert!(said.contains(&far) && said.contains(" mm (the tool, "), "{off_mm}: {said}");
     }
-    assert!(!said(0.0).contains("far from nominal"), "{}", said(0.0));
+    // A ruler's centimetre is good enough for a tool.
+    for off_mm in [0.0, 6.0, -9.0] {
+        assert!(!said(off_mm).contains("far from nominal"), "{off_mm}: {}", said(off_mm));
+    }
 }
 
 /// A joint that slides has the unit of its own column, else that of the points; a column of lengths is no joint that turns.

@@ -215,7 +215,11 @@ fn hints_count_the_columns_and_know_touches() {
     let other =
         |q: &[f64], p: &[f64; 3]| [q.to_vec(), p.map(|v| (1e3 * v).sin()).to_vec(), vec![2.5, 3.5 + q[0]]].concat();
     let none = folder.file("none.csv", text("", &rows, ",", other));
-    refused(&source(&[&none]), &robot, &["names the 11 columns in their order: j1 to j6"]);
+    refused(
+        &source(&[&none]),
+        &robot,
+        &["of this robot; if it is, `--columns` names the 11 columns in their order: j1 to j6"],
+    );
     // What stands behind the columns that are named is not used.
     let more = |q: &[f64], p: &[f64; 3]| [joined(q, p), vec![q[0] / 7.0, p[0] / 3.0]].concat();
     let more = folder.file("more.csv", text("", &rows, ",", more));

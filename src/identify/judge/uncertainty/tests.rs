@@ -46,3 +46,24 @@ fn nineteen_of_twenty_errors_at_fresh_poses_are_below_what_is_promised() {
         assert!((0.93..0.98).contains(&share) && all > 900, "{samples} rows: {share} of {all}");
     }
 }
+
+/// What is promised holds the instrument's noise where nothing is stated of it, and says that it does not where it is.
+#[test]
+fn what_is_promised_says_whether_the_instruments_noise_is_in_it() {
+    for stated in [false, true] {
+        let mut world = synthetic::planned(240, 60, 25.0, 0.1, 3, &|_| {});
+        synthetic::state(&mut world.rows, |_| stated.then(|| Matrix3::from_diagonal_element(0.1 * 0.1)));
+        let (set, found) = world.identified(&world.rows);
+        let expected = Expected::new(found.formulation().unwrap(), &set, &found.fitted);
+        let said = expected.parts();
+        let errors = Judge::plain(&set, &found.fitted, false).errors(found.robot(), &set.verify_rows());
+        let errors_mm: Vec<f64> = errors.iter().filter_map(|error| Some(error.point_mm?.norm())).collect();
+        let mean_mm = errors_mm.iter().sum::<f64>() / errors_mm.len() as f64;
+        let noise_mm = MEAN_OVER_RMS * 3f64.sqrt() * expected.stated_mm.unwrap_or(0.0);
+        let ratio = expected.mean_mm.hypot(noise_mm) / mean_mm;
+        assert!((0.8..1.3).contains(&ratio), "{stated}: {mean_mm} mm, {said}");
+        assert_eq!(said.contains("instrument"), !stated, "{said}");
+        assert_eq!(said.contains("their own noise, too (standard deviation 0.1000 mm)"), stated, "{said}");
+        assert!(!stated || expected.mean_mm < 0.8 * mean_mm, "{mean_mm} mm, {said}");
+    }
+}
