@@ -116,10 +116,16 @@ impl PhysicalBoard {
         Point3::new(x_mm, y_mm, self.height_mm(x_mm, y_mm))
     }
 
-    /// Where inner corner `(col, row)` really is, in the board's frame, mm.
+    /// Where inner corner `(col, row)` really is, in the board's frame, mm: where two black squares meet at the crossing of their lines, of a black square
+    /// alone where the ink ends.
     pub fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
         let p = self.crossing_mm(col + 1, row + 1);
-        self.on_surface(p.x, p.y)
+        if self.has_saddles() {
+            return self.on_surface(p.x, p.y);
+        }
+        let spread_mm = self.workmanship.ink_spread_um * 1e-3;
+        let [right, down] = Board::outwards(col, row);
+        self.on_surface(p.x + spread_mm * right, p.y + spread_mm * down)
     }
 
     /// Half the plate's width and height, mm.
@@ -147,6 +153,11 @@ impl PhysicalBoard {
             Point2::new(p.x + sx * s, p.y + sy * s)
         };
         [at(0, 0, -1.0, -1.0), at(1, 0, 1.0, -1.0), at(1, 1, 1.0, 1.0), at(0, 1, -1.0, 1.0)]
+    }
+
+    /// Whether black squares meet at its crossings.
+    pub fn has_saddles(&self) -> bool {
+        self.layout() != Layout::Grid
     }
 
     /// The four corners of a face in one of the squares, in order round it, mm: it moves with the square's crossings. The ink's spread is not

@@ -90,10 +90,12 @@ impl Sheet {
         let (left, top) = ((width_mm - width) / 2.0, (height_mm - FOOT_MM - height) / 2.0);
         let mut patches: Vec<Patch> = Vec::new();
         let (pitch, sides) = (board.pitch(), board.sides_mm());
+        // Nothing is printed beyond the outermost tags where there are no black squares.
+        let first = if board.is_grid() { 0.0 } else { pitch.at(-1) };
         let of = |face: &Face, is_black: bool| {
             let squares = [face.square.0, face.square.1].map(|k| k as isize - 1);
             let at = |axis: usize, share: f64| {
-                let (from, wide) = (pitch.at(squares[axis]) - pitch.at(-1), pitch.after(squares[axis]));
+                let (from, wide) = (pitch.at(squares[axis]) - first, pitch.after(squares[axis]));
                 (from + share * wide) * sides[axis]
             };
             let ([x, y], [right, below]) = ([0, 1].map(|k| at(k, face.from[k])), [0, 1].map(|k| at(k, face.to[k])));

@@ -33,12 +33,17 @@ pub enum Kind {
         layout: Option<Layout>,
     },
     /// Kalibr's AprilGrid: tags with black squares in the corners between them. Where dark and light meet it is a checkerboard whose squares are a tag and
-    /// a gap wide in turn; the outermost are gaps.
+    /// a gap wide in turn; the outermost are gaps. OpenCV's grid of tags is the same without the black squares.
     Tags {
         /// Width of a gap, mm.
         gap_mm: f64,
         /// The tags' codes.
         family: Dictionary,
+        /// Whose grid it is, where that is said; else Kalibr's until OpenCV's is seen.
+        layout: Option<Layout>,
+        /// By how much each side of a tag of OpenCV's grid is printed farther out than it is drawn, mm: what black runs. Where two black squares meet it
+        /// moves nothing.
+        spread_mm: f64,
     },
 }
 
@@ -83,7 +88,9 @@ impl Board {
             Kind::Charuco { marker_mm, dictionary, layout } => {
                 Kind::Charuco { marker_mm: marker_mm * factor, dictionary, layout }
             }
-            Kind::Tags { gap_mm, family } => Kind::Tags { gap_mm: gap_mm * factor, family },
+            Kind::Tags { gap_mm, family, layout, spread_mm } => {
+                Kind::Tags { gap_mm: gap_mm * factor, family, layout, spread_mm: spread_mm * factor }
+            }
         };
         Board { square_mm: self.square_mm * factor, kind, ..self }
     }
@@ -92,7 +99,7 @@ impl Board {
     pub fn layouts(&self) -> Vec<Layout> {
         match self.kind {
             Kind::Charuco { layout: Some(layout), .. } => vec![layout],
-            Kind::Tags { .. } => vec![Layout::Tags],
+            Kind::Tags { layout, .. } => vec![layout.unwrap_or(Layout::Tags)],
             _ if self.squares.rows.is_multiple_of(2) => vec![Layout::New, Layout::Old],
             _ => vec![Layout::New],
         }
@@ -100,8 +107,44 @@ impl Board {
 
     /// The board with markers in these squares.
     pub fn with_layout(self, layout: Layout) -> Board {
-        let Kind::Charuco { marker_mm, dictionary, .. } = self.kind else { return self };
-        Board { kind: Kind::Charuco { marker_mm, dictionary, layout: Some(layout) }, ..self }
+        let layout = Some(layout);
+        let kind = match self.kind {
+            Kind::Checker => Kind::Checker,
+            Kind::Charuco { marker_mm, dictionary, .. } => Kind::Charuco { marker_mm, dictionary, layout },
+            Kind::Tags { gap_mm, family, spread_mm, .. } => Kind::Tags { gap_mm, family, layout, spread_mm },
+        };
+        Board { kind, ..self }
+    }
+
+    /// Whether it is OpenCV's grid of tags, whose corners move as black spreads.
+    pub fn is_grid(&self) -> bool {
+        matches!(self.kind, Kind::Tags { layout: Some(Layout::Grid), .. })
+    }
+
+    /// Whether nobody said whose grid of tags it is.
+    pub fn may_be_grid(&self) -> bool {
+        matches!(self.kind, Kind::Tags { layout: None, .. })
+    }
+
+    /// How far black has spread, mm; zero where it moves no corner.
+    pub fn spread_mm(&self) -> f64 {
+        match self.kind {
+            Kind::Tags { spread_mm, .. } => spread_mm,
+            _ => 0.0,
+        }
+    }
+
+    /// The grid of tags printed with another spread of black, in steps of a hundred-thousandth of a tag at the most: lengths that people read hold it.
+    pub fn with_spread_mm(self, spread_mm: f64) -> Board {
+        let Kind::Tags { gap_mm, family, layout, .. } = self.kind else { return self };
+        let steps = 10f64.powi((1e-5 * self.square_mm).log10().floor() as i32).recip();
+        let spread_mm = (spread_mm * steps).round() / steps;
+        Board { kind: Kind::Tags { gap_mm, family, layout, spread_mm }, ..self }
+    }
+
+    /// Which way a corner of a tag moves along x and along y as black spreads: outwards from its tag.
+    pub fn outwards(col: usize, row: usize) -> [f64; 2] {
+        [col, row].map(|line| if line.is_multiple_of(2) { -1.0 } else { 1.0 })
     }
 
     /// Says all that pictures of the board depend on; lengths only as ratios.
@@ -112,8 +155,9 @@ impl Board {
                 let (share, name) = (marker_mm / self.square_mm, dictionary.name());
                 format!("charuco {} {share} {name}{}", self.squares, layout.map_or("", Layout::of_name))
             }
-            Kind::Tags { gap_mm, family } => {
-                format!("tags {} {} {}", self.squares, gap_mm / self.square_mm, family.name())
+            Kind::Tags { gap_mm, family, layout, .. } => {
+                let (gap, name) = (gap_mm / self.square_mm, family.name());
+                format!("grid of tags {} {gap} {name}{}", self.squares, layout.map_or("", Layout::of_name))
             }
         }
     }
@@ -170,11 +214,17 @@ impl Board {
 
     /// Distance of two lines of corners that are so many lines apart, the first of them the first of the board, mm: along x, along y.
     pub fn spans_mm(&self, lines: usize) -> [f64; 2] {
-        self.sides_mm().map(|side| self.pitch().at(lines as isize) * side)
+        // Both are sides of tags: black spreads away from between them, or moves both alike.
+        let spread_mm = if lines.is_multiple_of(2) { 0.0 } else { 2.0 * self.spread_mm() };
+        self.sides_mm().map(|side| self.pitch().at(lines as isize) * side + spread_mm)
     }
 
-    /// Width and height of all its squares together, mm.
+    /// Width and height of all its squares together, mm; of all tags where nothing dark is beyond them.
     pub fn extent_mm(&self) -> [f64; 2] {
+        if self.is_grid() {
+            let [[width, _], [_, height]] = [self.columns() - 1, self.rows() - 1].map(|lines| self.spans_mm(lines));
+            return [width, height];
+        }
         let [width, height] = self.sides_mm();
         let pitch = self.pitch();
         let of = |corners: usize, side: f64| (pitch.at(corners as isize) - pitch.at(-1)) * side;
@@ -206,9 +256,9 @@ impl Board {
     pub fn id(&self, col: usize, row: usize) -> usize {
         match self.kind {
             Kind::Checker | Kind::Charuco { .. } => self.index(col, row),
-            Kind::Tags { .. } => {
+            Kind::Tags { layout, .. } => {
                 let corner = [[3, 2], [0, 1]][row % 2][col % 2];
-                4 * Layout::Tags.number(self.squares, col / 2 * 2 + 1, row / 2 * 2 + 1) + corner
+                4 * layout.unwrap_or(Layout::Tags).number(self.squares, col / 2 * 2 + 1, row / 2 * 2 + 1) + corner
             }
         }
     }
@@ -217,13 +267,13 @@ impl Board {
     pub fn by_id(&self, id: usize) -> (usize, usize) {
         match self.kind {
             Kind::Checker | Kind::Charuco { .. } => self.place(id),
-            Kind::Tags { .. } => {
+            Kind::Tags { layout, .. } => {
                 let ([columns, rows], (tag, corner)) = (self.tags(), (id / 4, id % 4));
                 let (col, row) = (2 * (tag % columns), tag / columns);
                 if row >= rows {
                     return (col, 2 * row);
                 }
-                let top = 2 * (rows - 1 - row);
+                let top = if layout == Some(Layout::Grid) { 2 * row } else { 2 * (rows - 1 - row) };
                 [(col, top + 1), (col + 1, top + 1), (col + 1, top), (col, top)][corner]
             }
         }
@@ -239,7 +289,14 @@ impl Board {
         let pitch = self.pitch();
         // Half of the width of a plain board is exact in steps of half a square; so is where its corners lie.
         let of = |line: usize, lines: usize| pitch.at(line as isize) - pitch.at(lines as isize - 1) / 2.0;
-        Point3::new(of(col, self.columns()) * self.square_mm, of(row, self.rows()) * self.square_mm * self.stretch, 0.0)
+        let (x, y) = (of(col, self.columns()) * self.square_mm, of(row, self.rows()) * self.square_mm * self.stretch);
+        match self.spread_mm() {
+            0.0 => Point3::new(x, y, 0.0),
+            spread_mm => {
+                let [right, down] = Board::outwards(col, row);
+                Point3::new(x + spread_mm * right, y + spread_mm * down, 0.0)
+            }
+        }
     }
 
     /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does. That is a half turn at the most
@@ -306,5 +363,25 @@ mod tests {
         let across = board.corner_mm(3, 0) - board.corner_mm(0, 0);
         assert_eq!((across.x, board.spans_mm(3), board.extent_mm()), (90.0, [90.0, 90.0], [160.0, 110.0]));
         assert!((board.corner_mm(0, 0) + board.corner_mm(5, 3).coords).coords.norm() < 1e-12);
+    }
+
+    #[test]
+    fn opencvs_tags_count_from_the_upper_row_and_grow_with_the_ink() {
+        let board: Board = "apriltag:3x2:tag36h11:40:10:opencv".parse().unwrap();
+        for (place, id) in [((0, 1), 0), ((1, 1), 1), ((1, 0), 2), ((0, 0), 3), ((2, 1), 4), ((0, 3), 12), ((5, 2), 22)]
+        {
+            assert_eq!((board.id(place.0, place.1), board.by_id(id)), (id, place));
+        }
+        assert!(board.by_id(24).1 >= board.rows());
+        assert_eq!(board.extent_mm(), [140.0, 90.0]);
+        let inked = board.with_spread_mm(0.25);
+        let between = |a: (usize, usize), b: (usize, usize)| inked.corner_mm(b.0, b.1) - inked.corner_mm(a.0, a.1);
+        // A tag is wider, a gap narrower, and like corners of two tags are as far apart as they are drawn.
+        assert_eq!(
+            [between((0, 0), (1, 0)).x, between((1, 0), (2, 0)).x, between((0, 1), (0, 3)).y],
+            [40.5, 9.5, 50.0]
+        );
+        assert_eq!([inked.spans_mm(1), inked.spans_mm(2), inked.extent_mm()], [[40.5; 2], [50.0; 2], [140.5, 90.5]]);
+        assert_eq!((inked.to_string(), inked.key()), (board.to_string(), board.key()));
     }
 }

@@ -12,6 +12,8 @@ pub enum Layout {
     Old,
     /// Every other one of every other row, the outermost are gaps: Kalibr's grid of tags.
     Tags,
+    /// The same without black squares between the tags: OpenCV's.
+    Grid,
 }
 
 impl Layout {
@@ -21,16 +23,23 @@ impl Layout {
             Layout::New => "OpenCV's layout since 4.6",
             Layout::Old => "OpenCV's layout before 4.6",
             Layout::Tags => "Kalibr's layout",
+            Layout::Grid => "OpenCV's layout, without black squares between them",
         }
     }
 
     /// What the end of a board's name says of it.
     pub fn of_name(self) -> &'static str {
         match self {
-            Layout::Tags => "",
+            Layout::Tags => ":kalibr",
+            Layout::Grid => ":opencv",
             Layout::New => ":new",
             Layout::Old => ":old",
         }
+    }
+
+    /// Whether it is one of a grid of tags.
+    pub fn is_of_tags(self) -> bool {
+        matches!(self, Layout::Tags | Layout::Grid)
     }
 
     /// Whether the square in this column and row holds a marker.
@@ -38,7 +47,7 @@ impl Layout {
         match self {
             Layout::New => (x + y).rem_euclid(2) == 1,
             Layout::Old => (x + y).rem_euclid(2) == 0,
-            Layout::Tags => x.rem_euclid(2) == 1 && y.rem_euclid(2) == 1,
+            Layout::Tags | Layout::Grid => x.rem_euclid(2) == 1 && y.rem_euclid(2) == 1,
         }
     }
 
@@ -47,16 +56,19 @@ impl Layout {
         match self {
             Layout::New | Layout::Old => !self.holds_marker(x, y),
             Layout::Tags => (x + y).rem_euclid(2) == 0,
+            Layout::Grid => self.holds_marker(x, y),
         }
     }
 
-    /// The number of the marker in a square that holds one, on a board of so many squares: they count row by row, Kalibr's tags from the lowest row up.
+    /// The number of the marker in a square that holds one, on a board of so many squares: they count row by row, Kalibr's tags from the lowest
+    /// row up.
     pub fn number(self, Squares { columns, rows }: Squares, x: usize, y: usize) -> usize {
         // Of two rows one holds the larger half.
         let first = match self {
             Layout::New => columns / 2,
             Layout::Old => columns.div_ceil(2),
             Layout::Tags => return (rows - 2 - y) / 2 * (columns / 2) + x / 2,
+            Layout::Grid => return y / 2 * (columns / 2) + x / 2,
         };
         y / 2 * columns + if y % 2 == 1 { first } else { 0 } + x / 2
     }

@@ -21,9 +21,9 @@ impl fmt::Display for Board {
                 let layout = layout.map_or("", Layout::of_name);
                 write!(f, "charuco:{squares}:{side}:{marker_mm}:{}{layout}", dictionary.name())
             }
-            Kind::Tags { gap_mm, family } => {
-                let [columns, rows] = self.tags();
-                write!(f, "apriltag:{columns}x{rows}:{}:{side}:{gap_mm}", family.tag_name())
+            Kind::Tags { gap_mm, family, layout, .. } => {
+                let ([columns, rows], layout) = (self.tags(), layout.map_or("", Layout::of_name));
+                write!(f, "apriltag:{columns}x{rows}:{}:{side}:{gap_mm}{layout}", family.tag_name())
             }
         }
     }
@@ -69,26 +69,35 @@ impl FromStr for Board {
                 };
                 board.check_markers().map(|()| board).map_err(refuse)
             }
-            ("checker" | "checkerboard" | "chessboard", _) => Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned())),
+            ("checker" | "checkerboard" | "chessboard", _) => {
+                Err(refuse("a checkerboard is `checker:COLSxROWS:SQUARE_MM`".to_owned()))
+            }
             ("charuco", _) => {
                 Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
             }
-            ("apriltag" | "aprilgrid", [_, _, _, _, "opencv"]) => Err(refuse(
-                "OpenCV's grid of tags has corners of one square only, which move with the ink: only Kalibr's with black squares between its tags is read"
-                    .to_owned(),
-            )),
-            ("apriltag" | "aprilgrid", [tags, family, tag_mm, gap_mm] | [tags, family, tag_mm, gap_mm, "kalibr"]) => {
+            ("apriltag" | "aprilgrid", [tags, family, tag_mm, gap_mm, layout @ ..]) if layout.len() <= 1 => {
+                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
+                    None => None,
+                    Some("kalibr") => Some(Layout::Tags),
+                    Some("opencv") => Some(Layout::Grid),
+                    Some(other) => {
+                        return Err(refuse(format!("`{other}` is no layout; there are `kalibr` and `opencv`")));
+                    }
+                };
                 let ((square_mm, stretch), gap_mm) = (sides(tag_mm)?, length(gap_mm)?);
                 let family = Dictionary::of_tags(family).map_err(&refuse)?;
                 let Squares { columns, rows } = Squares::of_tags(tags)?;
                 let squares = Squares { columns: 2 * columns + 1, rows: 2 * rows + 1 };
-                let board = Board { squares, square_mm, stretch, kind: Kind::Tags { gap_mm, family } };
+                let kind = Kind::Tags { gap_mm, family, layout, spread_mm: 0.0 };
+                let board = Board { squares, square_mm, stretch, kind };
                 board.check_markers().map(|()| board).map_err(refuse)
             }
-            ("apriltag" | "aprilgrid", _) => {
-                Err(refuse("a grid of AprilTags is `apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM`, counted in tags".to_owned()))
-            }
-            (other, _) => Err(refuse(format!("there is no kind of board named `{other}`; there are checker, charuco and apriltag"))),
+            ("apriltag" | "aprilgrid", _) => Err(refuse(
+                "a grid of AprilTags is `apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM`, counted in tags".to_owned(),
+            )),
+            (other, _) => Err(refuse(format!(
+                "there is no kind of board named `{other}`; there are checker, charuco and apriltag"
+            ))),
         }
     }
 }
@@ -139,7 +148,7 @@ impl Board {
         let kind = match self.kind {
             Kind::Checker => return None,
             Kind::Charuco { marker_mm, layout, .. } => Kind::Charuco { marker_mm, dictionary: other, layout },
-            Kind::Tags { gap_mm, .. } => Kind::Tags { gap_mm, family: other },
+            Kind::Tags { gap_mm, layout, spread_mm, .. } => Kind::Tags { gap_mm, family: other, layout, spread_mm },
         };
         let board = Board { kind, ..self };
         board.check_markers().is_ok().then_some(board)
@@ -158,7 +167,7 @@ impl Board {
         let kind = match self.kind {
             Kind::Checker => return None,
             Kind::Charuco { dictionary, layout, .. } => Kind::Charuco { marker_mm: mm, dictionary, layout },
-            Kind::Tags { family, .. } => Kind::Tags { gap_mm: mm, family },
+            Kind::Tags { family, layout, spread_mm, .. } => Kind::Tags { gap_mm: mm, family, layout, spread_mm },
         };
         let board = Board { kind, ..self };
         board.check_markers().is_ok().then_some(board)
@@ -212,6 +221,8 @@ mod tests {
             "charuco:11x8:15:11:DICT_ARUCO_ORIGINAL:old",
             "apriltag:6x6:tag36h11:35.2:10.56",
             "apriltag:7x4:tag25h9:40x40.1:8",
+            "apriltag:7x4:tag25h9:40:8:opencv",
+            "apriltag:7x4:tag25h9:40:8:kalibr",
         ] {
             let board: Board = text.parse().unwrap();
             assert_eq!(board.to_string(), text);
@@ -234,7 +245,7 @@ mod tests {
             ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
             ("dots:20x20:10", "there are checker, charuco and apriltag"),
             ("checker:20x20:10x12", "no square"),
-            ("apriltag:6x6:tag36h11:35.2:10.56:opencv", "only Kalibr's"),
+            ("apriltag:6x6:tag36h11:35.2:10.56:opncv", "`kalibr` and `opencv`"),
             ("apriltag:6x6:tag36h11:35.2", "apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM"),
             ("apriltag:6x6:tag36h12:35.2:10.56", "no family of tags"),
             ("apriltag:6:tag36h11:35.2:10.56", "COLUMNSxROWS tags"),

@@ -27,14 +27,17 @@ pub struct Faces {
 /// The faces of a board's markers; none of a plain board.
 pub fn faces(board: &Board, layout: Layout) -> Faces {
     let mut faces = Faces::default();
-    let Some(fields) = fields(board).first().copied() else { return faces };
+    // OpenCV's tags have a border of one bit, Kalibr's of two.
+    let all = fields(board);
+    let first = if layout == Layout::Grid { all.last() } else { all.first() };
+    let Some(fields) = first.copied() else { return faces };
     let Fields { share, bits, border, .. } = fields;
     let (margin, side) = ((1.0 - share) / 2.0, share / (bits + 2 * border) as f64);
     let squares = (0..board.squares.rows).flat_map(|y| (0..board.squares.columns).map(move |x| (x, y)));
     for square in squares.filter(|(x, y)| layout.holds_marker(*x as isize, *y as isize)) {
         let Some(code) = code_in(board, layout, (square.0 as isize, square.1 as isize)) else { continue };
         // A tag is a dark square itself.
-        if layout != Layout::Tags {
+        if !layout.is_of_tags() {
             faces.markers.push(Face { square, from: [margin; 2], to: [1.0 - margin; 2] });
         }
         for row in 0..bits {

@@ -42,7 +42,7 @@ pub const AGREEING: usize = 3;
 
 /// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any order then pass for a
 /// given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a placement needs two that do, or one without a wrong bit.
-fn tolerated(bits: usize) -> usize {
+pub fn tolerated(bits: usize) -> usize {
     bits * bits / 8
 }
 
@@ -70,6 +70,7 @@ pub fn code_in(board: &Board, layout: Layout, square: (isize, isize)) -> Option<
         Kind::Checker => None,
         Kind::Charuco { dictionary, .. } => dictionary.code(id),
         // Kalibr prints tags as their makers do, OpenCV upside down.
+        Kind::Tags { family, .. } if layout == Layout::Grid => family.code(id),
         Kind::Tags { family, .. } => Some(quarter_turned(family.code(id)?, family.bits(), 2)),
     }
 }

@@ -84,7 +84,7 @@ impl Scene<'_> {
                 }
             }
         }
-        if self.board.workmanship.ink_spread_um > 0.0 {
+        if self.board.workmanship.ink_spread_um > 0.0 && self.board.has_saddles() {
             for j in 1..squares.rows {
                 for i in 1..squares.columns {
                     let overlap = self.board_outline(&self.board.overlap_mm(i, j));
