@@ -3,7 +3,8 @@
 use nalgebra::{Point2, Vector2};
 
 use super::saddle_fit::window::Quad;
-use crate::imaging::board::Print;
+use crate::imaging::Board;
+use crate::imaging::board::{Layout, Pitch, Print};
 use crate::imaging::coded::local_map;
 use crate::imaging::coded::marker::{mapped, square_map};
 use crate::imaging::lattice::Places;
@@ -34,6 +35,8 @@ pub(super) struct Cell {
     pub(super) square: f64,
     /// The squares that hold them.
     pub(super) marked: [Option<Marked>; 2],
+    /// On which sides of the edges the only dark quadrant is, where there is but one.
+    pub(super) dark: Option<[f64; 2]>,
 }
 
 impl Cell {
@@ -58,6 +61,7 @@ impl Cell {
             share: 0.0,
             square: 1.0,
             marked: [None; 2],
+            dark: None,
         };
         (cell.side() * cell.skew() > LEAST_HEIGHT_PX).then_some(cell)
     }
@@ -65,6 +69,7 @@ impl Cell {
     /// The same on a board with markers.
     pub(super) fn with_markers(self, places: &Places, (col, row): (usize, usize), print: Option<Print>) -> Cell {
         let Some(Print { share, layout, pitch, .. }) = print else { return self };
+        let edges = if layout == Layout::Grid { self.within_gaps(places, pitch, [col, row]) } else { self.edges };
         let (col, row) = (col as isize, row as isize);
         // Of the four squares round a corner two that lie opposite hold markers, or one is a tag.
         let round = [(0, 0), (-1, -1), (-1, 0), (0, -1)];
@@ -74,14 +79,33 @@ impl Cell {
         let marked = [holding.next(), holding.next()].map(|square| {
             let (c, r) = square?;
             let known = local_map::square(places, pitch, (col + c, row + r));
-            let [a, b] = self.edges.map(|edge| edge * side);
+            let [a, b] = edges.map(|edge| edge * side);
             let edges_only = || {
                 let first = a * c as f64 + b * r as f64;
                 [first, first + a, first + a + b, first + b]
             };
             Some(Marked(known.map_or_else(edges_only, |corners| corners.map(|p| p - self.place))))
         });
-        Cell { share, marked, square: side, ..self }
+        let dark = (layout == Layout::Grid).then(|| {
+            let [right, down] = Board::outwards(col as usize, row as usize).map(|out| -out);
+            let normal = |k: usize| Vector2::new(-edges[k].y, edges[k].x);
+            [normal(0).dot(&(edges[1] * down)).signum(), normal(1).dot(&(edges[0] * right)).signum()]
+        });
+        Cell { edges, share, marked, square: side, dark, ..self }
+    }
+
+    /// The edges, no longer than a gap is wide where the tag beyond the gap is not seen: what is there instead nobody knows.
+    fn within_gaps(&self, places: &Places, pitch: Pitch, [col, row]: [usize; 2]) -> [Vector2<f64>; 2] {
+        let [x, y] = Board::outwards(col, row).map(|out| out as isize);
+        let (c, r) = (col as isize, row as isize);
+        let is_seen = [places.around(c + x, r).is_some(), places.around(c, r + y).is_some()];
+        [0, 1].map(|k| if is_seen[k] { self.edges[k] } else { self.edges[k] * pitch.least() })
+    }
+
+    /// Over how much of bend times the half of a window squared a straight edge is off at the corner: through it by a sixth, where it ends there by a
+    /// twelfth the other way.
+    pub(super) fn straight(&self) -> f64 {
+        if self.dark.is_some() { -12.0 } else { 6.0 }
     }
 
     /// Whether it lies on a board with markers.
@@ -114,9 +138,10 @@ impl Cell {
     }
 
     /// Whether a first fit, whose window leaves out what a sharp picture shows of the markers, is more than a start. Two markers that lie opposite each
-    /// other pull a corner hardly; a tag has none opposite, and the next corner is but a gap away.
+    /// other pull a corner hardly; a tag has none opposite, and the next corner is but a gap away. Beside a single dark quadrant the bits of its tag are as near
+    /// as its border is wide: such a fit is a start and no more.
     pub(super) fn stands_alone(&self, blur_px: f64) -> bool {
-        self.square <= 1.0 || self.hidden(blur_px).is_some()
+        self.square <= 1.0 || self.dark.is_none() && self.hidden(blur_px).is_some()
     }
 
     /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
@@ -157,7 +182,6 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imaging::board::{Layout, Pitch};
     use crate::imaging::lattice::Lattice;
 
     /// A grid of tags of 40 px, their gaps a share of it, seen so obliquely that its columns are as short as this.

@@ -40,12 +40,13 @@ fn coarse_fit(copy: &Image<u8>, cell: &Cell, window: &mut Window) -> Option<(Fit
             half_contrast: 0.0,
             light_slope: Vector2::zeros(),
             bend: [0.0; 2],
+            dark: cell.dark,
         };
         let halves = cell.edges.map(|e| e.normalize() * half);
         // A stretched copy reaches 255 without being clipped.
         // A first fit is but a start: what the blur of a marker does to it matters less than pixels.
         let hidden = cell.hidden_by(HALO_BLURS * start.blur_px[0]);
-        let frame = Frame { start: cell.place, halves, band_px: f64::MAX, hidden };
+        let frame = Frame { start: cell.place, halves, band_px: f64::MAX, hidden, dark: cell.dark };
         window.collect(copy, 0.0, &Below(f64::MAX), &frame);
         if let Some(first) = fit(&start, window, Beside::default())
             && plausible(&first, &start, cell, MOST_LIGHT_CHANGE)

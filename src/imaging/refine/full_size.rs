@@ -45,6 +45,8 @@ const NEAR_SHARE: f64 = 0.7;
 /// there, and in how many rounds: within it the edges' profiles are as good as straight lines.
 const MOST_BENT_BLURS: f64 = 0.3;
 const MOST_ROUNDS: usize = 6;
+/// By how much wider than it was thought to be a blur may be for what its window leaves out to be right.
+const MOST_WIDER: f64 = 1.03;
 
 /// The picture at full size.
 pub(super) struct Full<'a, T> {
@@ -209,7 +211,8 @@ impl<T: Sample> Full<'_, T> {
             let halves = self.inside(cell, halves);
             let band_px = BAND_BLURS * blur + 1.0;
             let hidden = cell.hidden(blur)?;
-            window.collect(self.image, self.veil, keep, &Frame { start: cell.place, halves, band_px, hidden });
+            let frame = Frame { start: cell.place, halves, band_px, hidden, dark: cell.dark };
+            window.collect(self.image, self.veil, keep, &frame);
             let found = fit(&start, &window, beside)?;
             let wider = found.model.blur_px[0].max(found.model.blur_px[1]);
             // The copy may have hidden how wide the blur is; the band must hold the whole edge.
@@ -217,6 +220,11 @@ impl<T: Sample> Full<'_, T> {
             let bent_px = |k: usize| (found.model.bend[k] - start.bend[k]).abs() * halves[k].norm_squared() / 2.0;
             if in_band && round < MOST_ROUNDS && bent_px(0).max(bent_px(1)) > MOST_BENT_BLURS * blur {
                 start = Model { bend: found.model.bend, ..start };
+                continue;
+            }
+            // Without a second tag opposite, what is seen of a tag's bits moves the corner.
+            if in_band && cell.dark.is_some() && wider > MOST_WIDER * blur && round < MOST_ROUNDS {
+                start = Model { blur_px: found.model.blur_px, ..start };
                 continue;
             }
             if in_band {

@@ -60,14 +60,12 @@ impl Keep for Explained {
 
 /// The model's grey value, where edges that are not square to each other overlap to a twentieth of the contrast.
 fn about(model: &Model, x: f64, y: f64) -> f64 {
-    let pattern: f64 = [0, 1]
-        .map(|k| {
-            let (sin, cos) = model.angles_rad[k].sin_cos();
-            let along = cos * x + sin * y;
-            let z = (cos * y - sin * x + 0.5 * model.bend[k] * along * along) / model.blur_px[k];
-            statrs::function::erf::erf(z * FRAC_1_SQRT_2)
-        })
-        .iter()
-        .product();
+    let [a, b]: [f64; 2] = [0, 1].map(|k| {
+        let (sin, cos) = model.angles_rad[k].sin_cos();
+        let along = cos * x + sin * y;
+        let z = (cos * y - sin * x + 0.5 * model.bend[k] * along * along) / model.blur_px[k];
+        statrs::function::erf::erf(z * FRAC_1_SQRT_2)
+    });
+    let pattern = model.dark.map_or(a * b, |[first, second]| 0.5 * (a * b + second * a + first * b - first * second));
     (1.0 + model.light_slope.x * x + model.light_slope.y * y) * (model.level + model.half_contrast * pattern)
 }

@@ -129,8 +129,9 @@ impl<T: Sample> Full<'_, T> {
         let scale = detected.level.scale();
         let near = coarse.filter_map(|col, row, from| {
             let bends = at(&coarse_bends, col, row);
-            let cell = Cell { own_bends: bends.map(|bend| bend.is_none()), ..Cell::of(&places, col, row)? };
-            let cell = cell.with_markers(&places, (col, row), detected.print);
+            let cell = Cell::of(&places, col, row)?.with_markers(&places, (col, row), detected.print);
+            // An edge that ends at the corner does not tell its bend from its turn.
+            let cell = Cell { own_bends: bends.map(|bend| bend.is_none() && cell.dark.is_none()), ..cell };
             let start = Model {
                 corner: Vector2::zeros(),
                 bend: bends.map(|bend| bend.map_or(0.0, |bend| bend.per_px)),

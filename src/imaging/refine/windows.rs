@@ -63,24 +63,25 @@ impl Windows {
         let across = |by: &dyn Fn(Bend, f64, f64) -> f64| {
             let [a, b] = [0, 1].map(|k| {
                 let half_px = corner.reach[k] * self.cell.edges[k].norm();
-                self.bends[k].map_or(1.0, |bend| by(bend, half_px, known[(k, k)]))
+                self.bends[k].map_or(1.0, |bend| by(bend, half_px * half_px / self.cell.straight(), known[(k, k)]))
             });
             back * Matrix2::new(a, 0.0, 0.0, b) * normals
         };
-        let scale = across(&|bend, half_px, known| (bend.variance_px2(half_px, known) / known).max(0.0).sqrt());
+        let scale = across(&|bend, by_bend, known| (bend.variance_px2(by_bend, known) / known).max(0.0).sqrt());
         let covariance_px2 = scale * corner.fit.covariance_px2 * scale.transpose();
         // What the line's other corners do to the place has nothing to do with the light in this one's window.
-        let place_by_light = across(&|bend, half_px, _| bend.own_share(half_px)) * corner.fit.place_by_light;
+        let place_by_light = across(&|bend, by_bend, _| bend.own_share(by_bend)) * corner.fit.place_by_light;
         Measured { fit: Fit { covariance_px2, place_by_light, ..corner.fit }, ..corner }
     }
 }
 
 impl Measured {
-    /// What the fit would be with other bends: a straight edge through a window is off by a sixth of bend times half the window squared.
+    /// What the fit would be with other bends.
     fn rebent(self, bend: [f64; 2], cell: &Cell) -> Measured {
         let Measured { px, fit, reach } = self;
         let bend = [0, 1].map(|k| if cell.own_bends[k] { fit.model.bend[k] } else { bend[k] });
-        let off = |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / 6.0;
+        let off =
+            |k: usize| (bend[k] - fit.model.bend[k]) * (reach[k] * cell.edges[k].norm()).powi(2) / cell.straight();
         let step = self.normals().try_inverse().map_or(Vector2::zeros(), |m| m * Vector2::new(off(0), off(1)));
         let model = Model { corner: fit.model.corner + step, bend, ..fit.model };
         Measured { px: px + step, fit: Fit { model, ..fit }, reach }

@@ -23,6 +23,8 @@ pub struct Crossing {
     nodes: [(f32, f32, f32); 6],
     /// The same for the correlation itself, with 4 / (tau cos).
     top: (f32, f32, f32),
+    /// The sides of both edges where the only dark quadrant is.
+    dark: Option<[f32; 2]>,
 }
 
 impl Crossing {
@@ -49,6 +51,7 @@ impl Crossing {
             stretch: (1.0 / (1.0 - correlation * correlation).sqrt()) as f32,
             nodes: NODES.map(|(node, weight)| at((node * angle).sin(), weight * angle * 4.0 / TAU)),
             top: at(correlation, 4.0 / (TAU * angle.cos())),
+            dark: model.dark.map(|sides| sides.map(|side| side as f32)),
         }
     }
 
@@ -63,6 +66,15 @@ impl Crossing {
             *pattern = a * b;
         }
         self.overlap([&edges[0].z, &edges[1].z], &mut pattern, &mut by_correlation, &mut other);
+        if let Some([first, second]) = self.dark {
+            // Half a crossing, and half of what takes the edges away from the other quadrants.
+            for l in 0..LANES {
+                let edges = second * edges[0].value[l] + first * edges[1].value[l];
+                pattern[l] = 0.5 * (pattern[l] + edges - first * second);
+                by_correlation[l] *= 0.5;
+                (other[0][l], other[1][l]) = (0.5 * (other[0][l] + second), 0.5 * (other[1][l] + first));
+            }
+        }
         let mut half = [0.0; LANES];
         for l in 0..LANES {
             let (x, y, weight) = (group.x[l], group.y[l], group.weight[l]);

@@ -41,6 +41,7 @@ impl Model {
             half_contrast: self.half_contrast + d[7],
             light_slope: self.light_slope + Vector2::new(d[8], d[9]),
             bend: self.bend,
+            dark: self.dark,
         }
     }
 
@@ -158,14 +159,21 @@ mod tests {
         let halves = model.angles_rad.map(|a| Vector2::new(a.cos(), a.sin()) * half as f64);
         let start = Point2::new(half as f64, half as f64);
         let mut window = Window::default();
-        window.collect(&picture, 0.0, &Below(65_535.0), &Frame { start, halves, band_px, hidden: [None; 2] });
+        window.collect(
+            &picture,
+            0.0,
+            &Below(65_535.0),
+            &Frame { start, halves, band_px, hidden: [None; 2], dark: model.dark },
+        );
         window
     }
 
     #[test]
     fn a_fit_without_noise_recovers_the_model() {
-        let truth = Model::example();
-        for band_px in [f64::MAX, 6.0] {
+        let quadrants = [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]];
+        let darks = [None].into_iter().chain(quadrants.map(Some));
+        for (dark, band_px) in darks.flat_map(|dark| [(dark, f64::MAX), (dark, 6.0)]) {
+            let truth = Model { dark, ..Model::example() };
             let window = window(&truth, 20, band_px);
             let start = Model {
                 corner: Vector2::new(-1.0, 1.2),

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! E is the sign pattern of two crossing lines under a Gaussian blur: the normal integral's dependence on the
-//! correlation is that of Drezner and Wesolowsky (1990).
+//! correlation is that of Drezner and Wesolowsky (1990). Where only the quadrant on the sides `d_1`, `d_2` of the edges is dark, the corner of a tag that
+//! nothing dark touches, E is `(E + d_2 erf(a/sqrt2) + d_1 erf(b/sqrt2) - d_1 d_2) / 2`: the same in that quadrant and on its edges, constant elsewhere.
 
 use nalgebra::Vector2;
 
@@ -41,6 +42,8 @@ pub struct Model {
     pub light_slope: Vector2<f64>,
     /// Bend of the two edges, 1/px.
     pub bend: [f64; 2],
+    /// The signs of both normals' products in the only dark quadrant; `None` where two are dark.
+    pub dark: Option<[f64; 2]>,
 }
 
 /// An edge as the loops over pixels take it.
@@ -134,6 +137,7 @@ impl Model {
             half_contrast: 70.0,
             light_slope: Vector2::new(-2e-3, 1.5e-3),
             bend: [1e-3, -2e-3],
+            dark: None,
         }
     }
 }

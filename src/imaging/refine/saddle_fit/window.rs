@@ -57,7 +57,7 @@ pub struct Window {
     /// Near edge `k` alone, on the side of the other edge where its normal's product is negative, then where it is positive.
     pub arms: [[Groups; 2]; 2],
     /// Away from both edges, where the product of both normals' products is negative, then where it is positive: the
-    /// sums of all products of `(1, x, y, grey)`.
+    /// sums of all products of `(1, x, y, grey)`. Of a corner with one dark quadrant that one alone, and all that is light.
     pub flat: [Matrix4<f64>; 2],
     /// Number of pixels that were not kept.
     pub left_out: usize,
@@ -76,6 +76,8 @@ pub struct Frame {
     pub band_px: f64,
     /// What is printed in two of the squares and is none of the corner's: pixels in it are no part of the window.
     pub hidden: [Option<Quad>; 2],
+    /// The signs of both edges' normals' products where the only dark quadrant is: elsewhere nothing is seen of the edges but at their crossing.
+    pub dark: Option<[f64; 2]>,
 }
 
 /// A convex shape of four corners in order round it, relative to the middle of a window, px.
@@ -194,16 +196,17 @@ impl Window {
                 }
                 let dx = run.start as f64 - cut.start.x;
                 let side = cut.bands.map(|band| usize::from(band.at(dx, dy) > 0.0));
-                let groups = match [0, 1].map(|k| near[k].contains(&run.start)) {
+                let by_edge = [0, 1].map(|k| near[k].contains(&run.start));
+                let groups = match by_edge {
                     [true, true] => &mut self.crossing,
-                    [true, false] => &mut self.arms[0][side[1]],
-                    [false, true] => &mut self.arms[1][side[0]],
-                    [false, false] if y.is_multiple_of(step) => {
-                        let alike = usize::from(side[0] == side[1]);
+                    [true, false] if cut.has_edge(side, 1) => &mut self.arms[0][side[1]],
+                    [false, true] if cut.has_edge(side, 0) => &mut self.arms[1][side[0]],
+                    _ if y.is_multiple_of(step) => {
+                        let alike = cut.alike(side, by_edge);
                         self.left_out += add(&mut self.flat[alike], &row[run], (veil, keep), (dx, dy));
                         continue;
                     }
-                    [false, false] => continue,
+                    _ => continue,
                 };
                 self.left_out += push(groups, &row[run], (veil, keep), (dx, dy));
             }
@@ -338,6 +341,8 @@ struct Cut {
     reach: f64,
     inside: [Strip; 2],
     bands: [Strip; 2],
+    /// On which sides of both edges the only dark quadrant is, one for the positive one.
+    dark: Option<[usize; 2]>,
 }
 
 impl Cut {
@@ -346,7 +351,21 @@ impl Cut {
         let inverse = Matrix2::from_columns(&[a, b]).try_inverse()?;
         let inside = [0, 1].map(|k| Strip { across: inverse.row(k).transpose(), limit: 1.0 });
         let bands = [a, b].map(|v| Strip { across: Vector2::new(-v.y, v.x).normalize(), limit: frame.band_px });
-        Some(Cut { start: frame.start, reach: a.y.abs() + b.y.abs(), inside, bands })
+        let dark = frame.dark.map(|sides| sides.map(|side| usize::from(side > 0.0)));
+        Some(Cut { start: frame.start, reach: a.y.abs() + b.y.abs(), inside, bands, dark })
+    }
+
+    /// Whether there is an edge along one of the lines, on this side of the other, `across`.
+    fn has_edge(&self, side: [usize; 2], across: usize) -> bool {
+        self.dark.is_none_or(|dark| dark[across] == side[across])
+    }
+
+    /// Which of the flats pixels on such sides of both edges belong to that see none, near whose lines they may be all the same.
+    fn alike(&self, side: [usize; 2], near: [bool; 2]) -> usize {
+        match self.dark {
+            Some(dark) if near != [false; 2] || dark != side => usize::from(dark[0] != dark[1]),
+            _ => usize::from(side[0] == side[1]),
+        }
     }
 
     /// The columns of a row that are in all strips.

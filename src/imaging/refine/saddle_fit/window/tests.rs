@@ -6,7 +6,7 @@ fn ramp() -> Image<u8> {
 
 fn collected(picture: &Image<u8>, start: Point2<f64>, halves: [Vector2<f64>; 2], band_px: f64) -> Window {
     let mut window = Window::default();
-    window.collect(picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2] });
+    window.collect(picture, 0.0, &Below(256.0), &Frame { start, halves, band_px, hidden: [None; 2], dark: None });
     window
 }
 
@@ -66,7 +66,7 @@ fn what_is_hidden_is_left_out_and_nothing_else() {
     let inside = |d: Vector2<f64>| (0..4).all(|k| (corners[(k + 1) % 4] - corners[k]).perp(&(d - corners[k])) >= 0.0);
     let expected = expected(halves, inside);
     for band_px in [f64::MAX, 6.0] {
-        let frame = Frame { start: START, halves, band_px, hidden: [None, Some(Quad(corners))] };
+        let frame = Frame { start: START, halves, band_px, hidden: [None, Some(Quad(corners))], dark: None };
         window.collect(&picture, 0.0, &Below(256.0), &frame);
         assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{band_px}");
         assert_eq!((window.count(), window.left_out), (expected[(0, 0)] as usize, 0));
