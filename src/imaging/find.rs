@@ -11,6 +11,7 @@ use rayon::prelude::*;
 
 use super::board::{Kind, Layout};
 use super::coded;
+use super::coded::measures::with_seen_spread;
 use super::detect::count::{Seen, squares_of};
 use super::detect::{self, Detected, Refusal, continuation};
 use super::image::pyramid::Small;
@@ -19,8 +20,8 @@ use super::input::cache::{self, Cache, Look, Sighting};
 use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::Lattice;
 use super::refine::fields;
-use super::shown::{printed, unseen_lines};
-use super::sort::{Sorted, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
+use super::shown::{missing_tags, printed, unseen_lines};
+use super::sort::{Sorted, in_one_layout, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, overlay, refine};
 use crate::diagnostic::count;
 use crate::files::OutDir;
@@ -77,13 +78,14 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     bar.finish_and_clear();
     let seen = seen.into_iter().map(|(_, looks)| looks).collect();
     let seen = with_common_sizes(folder.in_common_layout(seen, wanted), &wanted.board);
+    let (board, seen) = in_one_layout(wanted.board, seen);
     let other = other_board(&seen);
     printed(&wanted.board, &seen).iter().for_each(progress::note);
-    let Sorted { found, skipped, blind, open } = sort_out(&pairing.pairs, seen, wanted.board);
+    let Sorted { found, skipped, blind, open } = sort_out(&pairing.pairs, seen, board);
     if found.len() < wanted.needed {
         return Err(too_few(found.len(), (skipped, total), other));
     }
-    let pairs = number_alike(found, wanted.board);
+    let pairs = number_alike(found, board);
     if let Some(out) = wanted.overlays {
         draw(&pairs, &pairing.pairs, wanted.mosaic, out)?;
     }
@@ -91,9 +93,11 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         notes.push(format!("the board was found in {} of {total} pairs", pairs.len()));
     }
     unseen_lines(&wanted.board, &pairs).iter().for_each(progress::warn);
+    missing_tags(&board, &pairs).iter().for_each(progress::warn);
     let [left_size, right_size] = sizes;
     notes.extend(sizes_differ(sizes));
-    Ok(Corners { board: wanted.board, left_size, right_size, pairs, skipped, blind, open, notes })
+    let board = with_seen_spread(board, &pairs);
+    Ok(Corners { board, left_size, right_size, pairs, skipped, blind, open, notes })
 }
 
 /// That the two cameras' pictures are not of one size.
@@ -300,6 +304,8 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
                 .map(|seen| Board { squares: seen, ..board }),
         });
     }
+    let is_grid = detected.print.is_some_and(|print| print.layout == Layout::Grid);
+    let board = if is_grid { board.with_layout(Layout::Grid) } else { board };
     let mut corners = refine::refine(picture, detected);
     let measured = corners.filter_map(|_, _, corner| corner.used.then_some(corner.px));
     if let Some(refusal) = coded::measures::other_gaps(&board, &measured) {

@@ -5,7 +5,7 @@
 //! cameras stand, which other pairs tell, decides between them later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done
 //! counts as one without a board.
 
-use super::board::{Board, Squares};
+use super::board::{Board, Layout, Squares};
 use super::coded::measures;
 use super::corners::{OpenPair, PairCorners, Skipped};
 use super::detect::Refusal;
@@ -48,6 +48,24 @@ pub fn with_common_sizes(mut seen: Vec<[Look; 2]>, board: &Board) -> Vec<[Look; 
         }
     }
     seen
+}
+
+/// A grid of tags as most of its pictures show it, where nobody said whose it is, without those that show it otherwise.
+pub fn in_one_layout(board: Board, mut seen: Vec<[Look; 2]>) -> (Board, Vec<[Look; 2]>) {
+    let layout = |look: &Look| look.as_ref().ok()?.print.map(|print| print.layout);
+    let layouts: Vec<Layout> = seen.iter().flatten().filter_map(layout).collect();
+    let separate = layouts.iter().filter(|layout| **layout == Layout::Grid).count();
+    if !board.may_be_grid() || separate == 0 {
+        return (board, seen);
+    }
+    let most = if 2 * separate > layouts.len() { Layout::Grid } else { Layout::Tags };
+    for look in seen.iter_mut().flatten() {
+        if let Some(other) = layout(look).filter(|other| *other != most) {
+            let reason = format!("shows the tags in {}; most other pictures have another", other.said());
+            *look = Err(reason.into());
+        }
+    }
+    (if most == Layout::Grid { board.with_layout(most) } else { board }, seen)
 }
 
 /// The board that each of some pictures shows instead of the one that is looked for.

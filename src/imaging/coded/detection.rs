@@ -21,7 +21,7 @@ use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
 
 /// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing more is seen.
-const ENOUGH_MARGIN_PX: f64 = 5.0;
+pub const ENOUGH_MARGIN_PX: f64 = 5.0;
 /// Copies with so many pixels may be enlarged.
 const MOST_DOUBLED_PX: usize = 4_000_000;
 /// How far from where its neighbours have it a corner may lie, in sides of a square.
@@ -149,7 +149,7 @@ fn parts_on(
 }
 
 /// Copies in their order: from coarse to fine.
-fn levels(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
+pub fn levels(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
     let doubled = (picture.width() * picture.height() <= MOST_DOUBLED_PX).then_some(Level::Doubled);
     to_full_size(picture).chain(doubled)
 }
@@ -166,7 +166,7 @@ fn grids_on(
 }
 
 /// The grid without corners that lie elsewhere than their neighbours say, the worst first.
-fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
+pub fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
     loop {
         let Some(step) = grid.side_px(pitch) else { return grid };
         let off = |(col, row, p): (usize, usize, &Point2<f64>)| {

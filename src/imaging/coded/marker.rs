@@ -75,6 +75,11 @@ impl Fields {
         if share < 1.0 { share } else { bits as f64 / (bits + 2 * border) as f64 }
     }
 
+    /// Where the middle of the paper round a tag or marker is, in sides of its square from that one's edge; negative outside of it.
+    pub fn beyond(self) -> f64 {
+        self.paper
+    }
+
     /// How wide the square's own colour is round that.
     pub fn margin(self) -> f64 {
         (1.0 - self.marked()) / 2.0
@@ -215,7 +220,7 @@ pub fn fields(board: &Board) -> Vec<Fields> {
         Kind::Charuco { marker_mm, dictionary, .. } => {
             vec![Fields::of_marker(marker_mm / board.square_mm, dictionary.bits())]
         }
-        Kind::Tags { gap_mm, family } => {
+        Kind::Tags { gap_mm, family, .. } => {
             TAG_BORDERS.iter().map(|border| Fields::of_tag(gap_mm / board.square_mm, family.bits(), *border)).collect()
         }
     }

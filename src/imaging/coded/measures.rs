@@ -9,7 +9,8 @@ use super::marker::{Fields, grey_at, mapped, square_map};
 use crate::imaging::board::{Board, Kind, Layout};
 use crate::imaging::detect::Refusal;
 use crate::imaging::image::Picture;
-use crate::imaging::lattice::Places;
+use crate::imaging::lattice::{Lattice, Places};
+use crate::imaging::{Corner, PairCorners};
 use crate::statistics::median;
 
 /// How far the marker's size may be from the board's, as a share of a square.
@@ -17,6 +18,9 @@ const MOST_OFF: f64 = 0.05;
 /// How far the gaps between tags may be from the board's, as a share of theirs: printers stretch tags and gaps alike, and what a fisheye bends between two
 /// tags of six is less than half of it.
 const MOST_GAP_OFF: f64 = 0.015;
+/// The most by which black spreads on a print, mm, and as a share of the gaps: gaps that are narrower by more are others.
+const MOST_SPREAD_MM: f64 = 0.3;
+const MOST_SPREAD: f64 = 0.1;
 /// How many standard deviations of the median of all gaps in a picture that must be.
 const SURE: f64 = 5.0;
 
@@ -40,9 +44,39 @@ pub fn other_markers(
 pub fn other_gaps(board: &Board, corners: &Places) -> Option<Refusal> {
     let Kind::Tags { gap_mm, .. } = board.kind else { return None };
     let (gap, sigma) = seen_gap(corners)?;
+    if board.is_grid() {
+        let spread_mm = spread_mm(board, gap_mm, gap);
+        let most_mm = MOST_SPREAD_MM.min(MOST_SPREAD * gap_mm) + SURE * sigma * board.square_mm;
+        return (spread_mm.abs() > most_mm).then(|| refusal(board, gap * board.square_mm));
+    }
     let named = gap_mm / board.square_mm;
     let is_other = (gap - named).abs() > (MOST_GAP_OFF * named).max(SURE * sigma);
     is_other.then(|| refusal(board, gap * board.square_mm))
+}
+
+/// By how much each side of a tag is printed farther out than it is drawn where a gap is seen so wide, in sides of a tag, mm.
+fn spread_mm(board: &Board, gap_mm: f64, gap: f64) -> f64 {
+    (gap_mm - gap * board.square_mm) / (2.0 * (1.0 + gap))
+}
+
+/// How far black has spread on a grid of separate tags, by the corners of several pictures; `None` where no picture shows enough of it.
+fn seen_spread_mm<'a>(board: &Board, pictures: impl Iterator<Item = &'a [Corner]>) -> Option<f64> {
+    let Kind::Tags { gap_mm, .. } = board.kind else { return None };
+    let of = |corners: &[Corner]| {
+        let mut places: Places = Lattice::from_fn(board.columns(), board.rows(), |_, _| None);
+        let used = corners.iter().filter(|corner| corner.used);
+        for corner in used.filter(|corner| corner.col < places.columns && corner.row < places.rows) {
+            places.cells[corner.row * board.columns() + corner.col] = Some(corner.px);
+        }
+        Some(spread_mm(board, gap_mm, seen_gap(&places)?.0))
+    };
+    median(pictures.filter_map(of)).filter(|_| board.is_grid())
+}
+
+/// A grid of separate tags with the spread of black that its corners show.
+pub fn with_seen_spread(board: Board, pairs: &[PairCorners]) -> Board {
+    let pictures = pairs.iter().flat_map(|pair| [pair.left.as_slice(), pair.right.as_slice()]);
+    seen_spread_mm(&board, pictures).map_or(board, |mm| board.with_spread_mm(mm))
 }
 
 /// Why a board is refused whose markers, or the gaps between whose tags, are seen to be of another size, mm.

@@ -10,8 +10,11 @@ pub mod local_map;
 pub mod marker;
 pub mod measures;
 mod numbering;
+mod quads;
+mod separate;
 #[cfg(test)]
 mod tests;
 
-pub use detection::{BY_LAYOUT, HAS_MARKERS, HAS_TAGS, detect, of_other_kind};
+pub use detection::{BY_LAYOUT, HAS_MARKERS, HAS_TAGS, of_other_kind};
 pub use explain::is_unread;
+pub use separate::detect;

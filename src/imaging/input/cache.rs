@@ -106,8 +106,8 @@ type Kept = (usize, usize, [f64; 2], Option<[f64; 3]>, Option<f64>, Option<[f64;
 /// The board that a picture shows instead, and why that is no use.
 type Refused = (Option<String>, String);
 
-/// What an entry holds of a sighting: the corners; of the markers their share of a square, whether they are in the old layout and whether they
-/// are inverted; and the numbers that are open.
+/// What an entry holds of a sighting: the corners; of the markers their share of a square, whether they are in the old layout, or in OpenCV's
+/// of tags, and whether they are inverted; and the numbers that are open.
 type Seen = (Vec<Kept>, Option<(f64, bool, bool)>, Option<(Vec<Renumbering>, Refused)>);
 
 /// The entry: a checksum of the rest, the algorithm, and what it found.
@@ -118,7 +118,8 @@ fn text(look: &Look) -> String {
             let covariance = c.covariance_px2.map(|s| [s[(0, 0)], s[(0, 1)], s[(1, 1)]]);
             (c.col, c.row, [c.px.x, c.px.y], covariance, c.blur_px, c.reach, c.used)
         };
-        let print = print.map(|print| (print.share, print.layout == Layout::Old, print.inverted));
+        let print =
+            print.map(|print| (print.share, matches!(print.layout, Layout::Old | Layout::Grid), print.inverted));
         let open = open.as_ref().map(|open| (open.others.clone(), refused(&open.refusal)));
         (corners.iter().map(kept).collect::<Vec<Kept>>(), print, open)
     });
@@ -149,6 +150,7 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     let print = print.map(|(share, is_old, inverted)| {
         let layout = match board.layouts()[..] {
             [only] if !is_old => only,
+            [only] if only.is_of_tags() => Layout::Grid,
             _ if is_old => Layout::Old,
             _ => Layout::New,
         };

@@ -17,6 +17,8 @@ use self::line::{Columns, Line, Row};
 use super::pairs::natural_order;
 use crate::csv_table::{Table, quoted};
 use crate::files::Result;
+use crate::imaging::board::Layout;
+use crate::imaging::coded::measures::with_seen_spread;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side, Skipped};
 
 /// The header of `corners.csv`.
@@ -58,7 +60,12 @@ const UNUSED_ID: &str = "the corners file has a column `id`, as of a board with 
 pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
     let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
     let table = Table::read(path, "corners file", hint)?;
-    let mut rows = parse(&table, board)?;
+    let separate = board.may_be_grid().then(|| board.with_layout(Layout::Grid));
+    // The numbers of a grid of tags say whose it is, where the places do.
+    let (board, mut rows) = match (parse(&table, board), separate) {
+        (Err(error), Some(separate)) => (separate, parse(&table, separate).map_err(|_| error)?),
+        (rows, _) => (board, rows?),
+    };
     let mut notes = Vec::new();
     let is_unused = table.column("id").is_some() && !board.is_coded();
     if is_unused {
@@ -73,6 +80,7 @@ pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<C
         [size_of(&table, &rows, Side::Left, size)?, size_of(&table, &rows, Side::Right, size)?];
     let (pairs, skipped) = gather(rows, board);
     let (blind, open) = (Vec::new(), Vec::new());
+    let board = with_seen_spread(board, &pairs);
     Ok(Corners { board, left_size, right_size, pairs, skipped, blind, open, notes })
 }
 
