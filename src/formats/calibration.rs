@@ -50,6 +50,9 @@ pub struct CalibrationFile {
     /// The board that calibrated, by its name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     board: Option<String>,
+    /// How far black has spread on it, where that moves its corners.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    board_spread: Option<SpreadRecord>,
     /// Whether the last pairs confirmed the rig; empty where they did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unconfirmed: Vec<String>,
@@ -59,6 +62,13 @@ pub struct CalibrationFile {
     /// Slides of the board by known lengths, and what they say of the scale.
     #[serde(skip_deserializing, skip_serializing_if = "Vec::is_empty")]
     known_moves: Vec<KnownMove>,
+}
+
+/// By how much each side of a tag is printed farther out than it is drawn, with its expanded uncertainty (k = 2).
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+struct SpreadRecord {
+    mm: f64,
+    uncertainty_mm: f64,
 }
 
 /// Distances of the boards' corners from the left camera along its axis.
@@ -252,6 +262,7 @@ impl CalibrationFile {
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self.board = Some(calibration.board.to_string());
+        self.board_spread = calibration.spread_mm().map(|[mm, uncertainty_mm]| SpreadRecord { mm, uncertainty_mm });
         self.known_moves = facts.standards.moves.measured.clone();
         self
     }

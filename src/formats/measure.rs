@@ -156,7 +156,7 @@ fn shape_record(shape: &Shape, board: &Board) -> Value {
         })
     };
     let crossings = shape.deviations_mm.iter().zip(&shape.sigma_mm).enumerate().map(crossing);
-    json!({
+    let mut record = json!({
         // How far crossings scatter: a coordinate in the plane, and the height.
         "in_plane_mm": shape.in_plane_mm,
         "out_of_plane_mm": shape.out_of_plane_mm,
@@ -164,7 +164,18 @@ fn shape_record(shape: &Shape, board: &Board) -> Value {
         "scale_error": shape.stretch[0],
         "scale_error_sigma": shape.stretch[1],
         "crossings": crossings.collect::<Vec<_>>(),
-    })
+    });
+    if board.is_grid() {
+        // By how much each side of a tag is printed farther out than it is drawn.
+        let outwards = |(k, d): (usize, &Vector3<f64>)| {
+            let (col, row) = board.place(k);
+            let [right, down] = Board::outwards(col, row);
+            (right * d.x + down * d.y) / 2.0
+        };
+        let own_mm = shape.deviations_mm.iter().enumerate().map(outwards).sum::<f64>() / board.corner_count() as f64;
+        record["spread_mm"] = json!(board.spread_mm() + own_mm);
+    }
+    record
 }
 
 /// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`, rows in the order

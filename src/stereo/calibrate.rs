@@ -19,7 +19,7 @@ use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
 use crate::stereo::select::pair_scatter::PairScatter;
 use crate::stereo::select::stated_uncertainty::{self, Witness};
-use crate::stereo::solve::{Priors, Problem, Solved};
+use crate::stereo::solve::{Priors, Problem, Solved, Spread};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A calibrated rig with all that it was made from.
@@ -27,6 +27,8 @@ use crate::stereo::{Error, Lens, Rig};
 pub struct Calibration {
     /// The board that was seen.
     pub board: Board,
+    /// How far black has spread on it, beyond what its places hold, where that moves its corners.
+    pub spread: Option<Spread>,
     /// What was free.
     pub layout: Layout,
     /// The pairs that were used, with whitened corners; outliers are inactive.
@@ -77,6 +79,13 @@ impl Calibration {
     /// True where the lenses of both cameras were known before the pictures.
     pub fn lenses_are_known(&self) -> bool {
         self.known_sides.iter().all(|known| *known)
+    }
+
+    /// By how much each side of a tag of the board is printed farther out than it is drawn, where that moves its corners, and the expanded
+    /// uncertainty (k = 2), mm.
+    pub fn spread_mm(&self) -> Option<[f64; 2]> {
+        let spread = self.spread.as_ref()?;
+        Some([self.board.spread_mm() + spread.change_mm, 2.0 * spread.sigma_mm * self.inflation.sqrt()])
     }
 
     /// Names of the pairs that were used.
@@ -141,8 +150,30 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
 }
 
 /// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
-/// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them.
+/// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them. How far black has spread on a
+/// grid of separate tags is found by the way.
 pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
+    /// Share of its standard deviation that is not worth another round, and rounds at the most: the first step is nearly the last.
+    const STILL: f64 = 0.1;
+    const ROUNDS: usize = 3;
+    let mut found = with_spread(corners, options, runs, by_pairs)?;
+    for _ in 1..ROUNDS {
+        let Some(change_mm) =
+            found.spread.as_ref().filter(|s| s.change_mm.abs() > STILL * s.sigma_mm).map(|s| s.change_mm)
+        else {
+            break;
+        };
+        let board = found.board.with_spread_mm(found.board.spread_mm() + change_mm);
+        if board == found.board {
+            break;
+        }
+        found = with_spread(&Corners { board, ..corners.clone() }, options, runs, by_pairs)?;
+    }
+    Ok(found)
+}
+
+/// The same with the spread that the board has.
+fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
     let candidates = Candidates::new(corners, options.known.as_ref())?;
     let one_pose = || candidates.one_pose();
     let found = series::find(&candidates, runs).map_err(|error| error.of_one_pose(one_pose()))?;
@@ -161,9 +192,13 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
     let by_noise = by_corners * inflation;
     let without_scatter = by_noise.clone();
     let print = print_share(&solved, &corners.board, &layout);
+    let spread = corners.board.is_grid().then(|| Spread::of(&solved.problem, &layout)).flatten();
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
     let (mut covariance, pair_scatter, witnesses) =
         stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
+    if let Some(spread) = &spread {
+        covariance += spread.covariance(inflation);
+    }
     let Problem { views, mut values, priors } = solved.problem;
     let mut own_noise = solved.noise;
     if let Some(print) = print {
@@ -173,6 +208,7 @@ pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: 
     values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: covariance.clone() });
     Ok(Calibration {
         board: corners.board,
+        spread,
         layout,
         rms_px: solved.rms_px,
         noise: solved.noise,

@@ -31,6 +31,7 @@ use crate::stereo::judge::assessment::{Demand, Judged};
 use crate::stereo::judge::ledger::{LensPairs, Standards};
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::judge::lengths::second_board::{self, SecondBoard};
+use crate::stereo::judge::moved_tags;
 use crate::stereo::judge::moves;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
@@ -64,6 +65,8 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
         None => standing::calibrate_standing(&corners, &asked)?,
     };
     volume::lengths::check(&calibration, demand.extent)?;
+    moved_tags::said(&calibration).iter().for_each(progress::warn);
+    said_spread(&calibration, demand.tolerance_mm).iter().for_each(progress::note);
     let accuracy = held_out::hold_out(&calibration, demand.board_uncertainty_mm)?;
     let second = second_board(args, board, pairing.as_ref(), &calibration, (demand.board_uncertainty_mm, &out))?;
     let standards = Standards { second, moves: moves::measure(&calibration, &args.known_move)? };
@@ -93,6 +96,24 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// That black has spread on the board and its corners with it, where it is seen to have.
+fn said_spread(calibration: &Calibration, tolerance_mm: f64) -> Option<String> {
+    /// Share of the tolerance that is not worth a line.
+    const LEAST: f64 = 0.01;
+    let ([mm, uncertainty_mm], board) = (calibration.spread_mm()?, &calibration.board);
+    let pitch = board.spans_mm(2).map(|mm| format!("{:.3}", (mm * 1e6).round() / 1e6));
+    (mm.abs() > uncertainty_mm.max(LEAST * tolerance_mm)).then(|| {
+        format!(
+            "each side of the board's tags is printed {:.4} mm farther {} than it is drawn (to {uncertainty_mm:.4} mm): lengths allow for it. What scales them \
+             is a tag and a gap together, which must measure {} mm across and {} mm along",
+            mm.abs(),
+            if mm > 0.0 { "out" } else { "in" },
+            pitch[0],
+            pitch[1]
+        )
+    })
 }
 
 /// What lengths are judged by; refuses what can be refused without pictures.

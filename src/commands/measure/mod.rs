@@ -53,6 +53,8 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     progress::note(&pairing.taken);
     let corners = find_corners(&pairing, &wanted)?;
     known.rig.check_size(&corners)?;
+    // As it is seen: of a grid of tags whose it is, and how far black has spread.
+    let known = Knowledge { board: corners.board, ..known };
     let corners = open_numbers::by_rig(corners, &known.rig);
     corners.notes.iter().for_each(progress::note);
     let mut series = series::measure(&known, seen(poses, &corners));

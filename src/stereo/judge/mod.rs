@@ -5,6 +5,7 @@ pub mod doubtful_corners;
 pub mod evidence;
 pub mod ledger;
 pub mod lengths;
+pub mod moved_tags;
 pub mod moves;
 pub mod residual_correlation;
 #[cfg(test)]

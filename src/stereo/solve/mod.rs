@@ -6,9 +6,11 @@ pub mod normal_equations;
 pub mod priors;
 pub mod problem;
 pub mod robust_loss;
+mod spread;
 pub mod uncertainty;
 
 pub use normal_equations::Equations;
 pub use priors::Priors;
 pub use problem::{Problem, Solved};
 pub use robust_loss::Loss;
+pub use spread::Spread;

@@ -19,6 +19,9 @@ const HELD: f64 = 1e4;
 /// Share of a way of being bent that shift, tilts and the other ways must leave of it.
 const LEAST_OWN: f64 = 1e-6;
 
+/// How far black may have spread beyond what the corners' distances on the pictures say, mm, as a standard deviation: the pictures tell it.
+const SPREAD_MM: f64 = 0.1;
+
 /// What the calibration says.
 #[derive(Debug, Clone)]
 pub struct RigPrior {
@@ -138,6 +141,18 @@ pub fn stretch_mode(board: &Board) -> DVector<f64> {
     mode(board, |p| p.coords)
 }
 
+/// The unit vector of black that spreads, where that moves corners, and its length a mm.
+pub fn spread_mode(board: &Board) -> Option<(DVector<f64>, f64)> {
+    let mut all = DVector::zeros(3 * board.corner_count());
+    for i in 0..board.corner_count() {
+        let (col, row) = board.place(i);
+        let [right, down] = Board::outwards(col, row);
+        all.rows_mut(3 * i, 3).copy_from(&Vector3::new(right, down, 0.0));
+    }
+    let length = all.norm();
+    board.is_grid().then(|| (all / length, length))
+}
+
 /// Length of the vector of all deviations when the board is stretched by the whole of its size, mm.
 pub fn stretch_length_mm(board: &Board) -> f64 {
     board.corners_mm().map(|p| p.coords.norm_squared()).sum::<f64>().sqrt()
@@ -174,5 +189,8 @@ pub fn weights(rig: &RigPrior, shape: &ShapePrior, board: &Board, data: &DMatrix
         add(&mode, shape.bent_mm.powi(-2) - shape.out_of_plane_mm.powi(-2));
     }
     add(&stretch_mode(board), shape.stretch_mm.powi(-2) - shape.in_plane_mm.powi(-2));
+    if let Some((mode, length)) = spread_mode(board) {
+        add(&mode, (SPREAD_MM * length).powi(-2).min(shape.in_plane_mm.powi(-2)) - shape.in_plane_mm.powi(-2));
+    }
     weights
 }
