@@ -47,4 +47,5 @@ mod real;
 mod rectify;
 mod report;
 mod rows;
+mod separate_tags;
 mod unread;

@@ -24,7 +24,7 @@ fn main() {
     // One table alone where it is named; `poses N` draws N pairs.
     let arguments: Vec<String> = std::env::args().collect();
     let named = |name: &str| arguments.iter().position(|a| a == name);
-    let all = ["single", "boards", "poses", "coded", "tags"].into_iter().all(|name| named(name).is_none());
+    let all = ["single", "boards", "poses", "coded", "tags", "grid"].into_iter().all(|name| named(name).is_none());
     if all || named("single").is_some() {
         single::table();
         single::defocus();
@@ -36,7 +36,7 @@ fn main() {
         let count = named("poses").and_then(|at| arguments.get(at + 1)?.parse().ok());
         poses::table(count.unwrap_or(1000));
     }
-    for (name, kind) in [("coded", coded::Coded::Markers), ("tags", coded::Coded::Tags)] {
+    for (name, kind) in [("coded", coded::Coded::Markers), ("tags", coded::Coded::Tags), ("grid", coded::Coded::Grid)] {
         if all || named(name).is_some() {
             let number = |place: usize| named(name).and_then(|at| arguments.get(at + place)?.parse().ok());
             let folder = named(name).and_then(|at| arguments.get(at + 3)).map(std::path::Path::new);

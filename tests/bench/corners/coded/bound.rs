@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 use statrs::function::erf::erf;
+use stereocal::imaging::Board;
 use stereocal::imaging::board::{Kind, Layout};
 
 use super::case::{Case, LIGHTING, PRINT, SIZE};
@@ -15,6 +16,7 @@ pub fn margin(case: &Case) -> f64 {
     match case.board.kind {
         Kind::Checker => panic!("a board with markers"),
         Kind::Charuco { marker_mm, .. } => (1.0 - marker_mm / case.board.square_mm) / 2.0,
+        Kind::Tags { family, .. } if case.board.is_grid() => 1.0 / (family.bits() + 2) as f64,
         Kind::Tags { family, .. } => 2.0 / (family.bits() + 4) as f64,
     }
 }
@@ -62,7 +64,7 @@ pub fn bound(case: &Case, (col, row): (usize, usize)) -> Option<Matrix2<f64>> {
     // The window reaches as far as the nearer of a corner's neighbours.
     let half = |line: usize| board.pitch().after(line as isize).min(board.pitch().after(line as isize - 1));
     let (half_x, half_y) = (half(col), half(row));
-    let layout = if matches!(board.kind, Kind::Tags { .. }) { Layout::Tags } else { Layout::New };
+    let layout = board.layouts().first().copied().unwrap_or(Layout::New);
     let holds_marker = |x: f64, y: f64| {
         let square = |line: usize, at: f64| line as isize + isize::from(at > 0.0);
         layout.holds_marker(square(col, x), square(row, y))
@@ -74,6 +76,8 @@ pub fn bound(case: &Case, (col, row): (usize, usize)) -> Option<Matrix2<f64>> {
         let is_inside = x.abs() < half_x - halo_x && y.abs() < half_y - halo_y;
         is_inside && (!holds_marker(x, y) || beside_marker(x, halo_x) || beside_marker(y, halo_y))
     };
+    // On which sides of the edges the only dark quadrant is; the normals point along the columns and the rows.
+    let dark = board.is_grid().then(|| Board::outwards(col, row)).map(|[right, down]| [-right, -down]);
     let to_board = here.try_inverse()?;
     let sensor = case.sensor();
     let reach = (2.0 * here.norm()).ceil().min(250.0) as i32;
@@ -96,13 +100,18 @@ pub fn bound(case: &Case, (col, row): (usize, usize)) -> Option<Matrix2<f64>> {
         }
         let [e, f] = u.map(|u| erf(u / 2f64.sqrt()));
         let [de, df] = u.map(|u| (2.0 / std::f64::consts::PI).sqrt() * (-u * u / 2.0).exp() / blur_px);
+        // Of a corner with one dark quadrant: the pattern, and what the other edge lets be seen of each.
+        let (pattern, [by_e, by_f]) = match dark {
+            None => (e * f, [f, e]),
+            Some([a, b]) => (0.5 * (e * f + b * e + a * f - a * b), [0.5 * (f + b), 0.5 * (e + a)]),
+        };
         let half_contrast = (PRINT.white - PRINT.black) / 2.0 * light;
         let scale = half_contrast * sensor.top();
-        let slope = (normals[0] * de * f + normals[1] * e * df) * scale;
+        let slope = (normals[0] * de * by_e + normals[1] * by_f * df) * scale;
         // Turns move an edge by the place along it, blurs by the place across.
         let lengthwise = [0, 1].map(|k| Vector2::new(normals[k].y, -normals[k].x).dot(&off) / f64::from(reach));
-        let turns = [de * f * lengthwise[0], e * df * lengthwise[1]].map(|turn| turn * scale);
-        let blurs = [de * f * u[0], e * df * u[1]].map(|blur| blur * scale);
+        let turns = [de * by_e * lengthwise[0], by_f * df * lengthwise[1]].map(|turn| turn * scale);
+        let blurs = [de * by_e * u[0], by_f * df * u[1]].map(|blur| blur * scale);
         let light_slope = off / f64::from(reach) * scale;
         let row = SVector::from([
             slope.x,
@@ -112,11 +121,15 @@ pub fn bound(case: &Case, (col, row): (usize, usize)) -> Option<Matrix2<f64>> {
             blurs[0],
             blurs[1],
             scale,
-            e * f * scale,
+            pattern * scale,
             light_slope.x,
             light_slope.y,
         ]);
-        let darker = if holds_marker(1.0, 1.0) || holds_marker(-1.0, -1.0) { e * f } else { -e * f };
+        let darker = match dark {
+            Some([a, b]) => -a * b * pattern,
+            None if holds_marker(1.0, 1.0) || holds_marker(-1.0, -1.0) => e * f,
+            None => -e * f,
+        };
         let value = (PRINT.white + PRINT.black) / 2.0 * light + half_contrast * darker.abs() * darker.signum();
         let shot = value * sensor.top().powi(2) / sensor.full_well_e;
         let variance = shot + case.noise.powi(2) + 1.0 / 12.0;

@@ -28,6 +28,8 @@ pub enum Coded {
     Markers,
     /// Kalibr's grids of AprilTags.
     Tags,
+    /// OpenCV's.
+    Grid,
 }
 
 pub const PRINT: Print = Print { white: 0.85, black: 0.08, rim: 0.3, rim_mm: 3.0 };
@@ -62,11 +64,12 @@ fn board(kind: Coded, number: usize) -> Board {
             let share = [0.6, 0.7, 0.8][number / dictionaries.len() % 3];
             format!("charuco:{columns}x{rows}:{SQUARE_MM}:{}:{}:new", SQUARE_MM * share, dictionary.name())
         }
-        Coded::Tags => {
+        Coded::Tags | Coded::Grid => {
             let families: Vec<Dictionary> = Dictionary::all().filter(|d| d.name().contains("APRILTAG")).collect();
             let family = families[number % families.len()];
             let gap = [0.2, 0.3, 0.4][number / families.len() % 3];
-            format!("apriltag:6x4:{}:{TAG_MM}:{}", family.tag_name(), TAG_MM * gap)
+            let layout = if matches!(kind, Coded::Grid) { ":opencv" } else { "" };
+            format!("apriltag:6x4:{}:{TAG_MM}:{}{layout}", family.tag_name(), TAG_MM * gap)
         }
     };
     name.parse().unwrap()

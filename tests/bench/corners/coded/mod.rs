@@ -1,7 +1,7 @@
 //! Boards with markers and grids of tags, seen in part: whether any corner has another's number, and how well and how surely the corners lie.
 //!
 //! Every dictionary, markers of 0.6 to 0.8 of a square, or every family of tags, gaps of 0.2 to 0.4 of a tag; tilts to 60 degrees, blur to 2.5 px, noise to 5 grey levels, squares of 12 to 100 px, from the
-//! whole board down to a tenth of it. `-- coded FIRST COUNT` (of grids of tags `-- tags FIRST COUNT`) takes the pictures from one number on, so that parts of a long run add up; with a
+//! whole board down to a tenth of it. `-- coded FIRST COUNT` (of grids of tags `-- tags FIRST COUNT`, of OpenCV's `-- grid FIRST COUNT`) takes the pictures from one number on, so that parts of a long run add up; with a
 //! folder behind that the pictures are written there with truth and findings, for `scripts/peers_coded.py`.
 
 mod bound;
@@ -119,6 +119,7 @@ pub fn table(kind: Coded, first: usize, count: usize, folder: Option<&Path>) {
     let boards = match kind {
         Coded::Markers => "ChArUco boards",
         Coded::Tags => "grids of AprilTags",
+        Coded::Grid => "OpenCV's grids of AprilTags",
     };
     println!(
         "{boards} in part, {} px, pictures {first} to {}: corners by the markers' codes",
