@@ -24,7 +24,7 @@ fn measured(said: &str, picture: &Picture, truth: &[Point2<f64>]) -> (usize, f64
             (count, sum) = (count + 1, sum + off.dot(&(covariance.try_inverse().unwrap() * off)) / 2.0);
         }
     }
-    (count, sum / f64::from(count.max(1)))
+    (count, sum / count.max(1) as f64)
 }
 
 fn refusal(picture: &Picture, said: &str) -> String {

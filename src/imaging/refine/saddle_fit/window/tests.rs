@@ -112,6 +112,7 @@ fn a_window_over_the_border_keeps_what_is_there() {
         halves: [Vector2::new(5.0, 0.0), Vector2::new(0.0, 5.0)],
         band_px: f64::MAX,
         hidden: [None; 2],
+        dark: None,
     };
     let mut window = Window::default();
     window.collect(&picture, 0.0, &Below(256.0), &frame);
@@ -123,5 +124,20 @@ fn a_window_over_the_border_keeps_what_is_there() {
     for start in [Point2::new(-50.0, 1e6), Point2::new(f64::NAN, f64::NAN), Point2::new(f64::INFINITY, 0.0)] {
         window.collect(&picture, 0.0, &Below(256.0), &Frame { start, ..frame });
         assert_eq!(window.count(), 0);
+    }
+}
+
+#[test]
+fn beside_a_single_dark_quadrant_every_pixel_is_counted_once_and_only_its_own_edges_have_arms() {
+    let halves = [Vector2::new(30.0, 8.0), Vector2::new(-8.0, 30.0)];
+    let expected = expected(halves, |_| false);
+    for dark in [[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]] {
+        let mut window = Window::default();
+        let frame = Frame { start: START, halves, band_px: 4.0, hidden: [None; 2], dark: Some(dark) };
+        window.collect(&ramp(), 0.0, &Below(256.0), &frame);
+        assert!((total(&window) - expected).amax() < 1e-7 * expected.amax(), "{dark:?}");
+        let has_arm = window.arms.each_ref().map(|sides| sides.each_ref().map(|arm| arm.count > 0));
+        let on = |side: f64| [side < 0.0, side > 0.0];
+        assert_eq!(has_arm, [on(dark[1]), on(dark[0])], "{dark:?}");
     }
 }
