@@ -147,7 +147,13 @@ impl Cell {
     /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
     pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
         let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);
-        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + HALO_PX))
+        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + self.beside_px()))
+    }
+
+    /// How far from where it should be what is beside the corner may be printed, px. A tag's bits are printed with its edges, and its border is so narrow
+    /// that a px of it is most of what a window leaves.
+    pub(super) fn beside_px(&self) -> f64 {
+        if self.dark.is_some() { 0.0 } else { HALO_PX }
     }
 
     /// The markers beside the corner, larger by a halo, px.
