@@ -29,13 +29,13 @@ pub fn said(calibration: &Calibration) -> Option<String> {
     let usual_px = median(by_tag.values().flatten().copied())?;
     let far = |(tag, missed): (&usize, &Vec<f64>)| {
         let px = median(missed.iter().copied()).filter(|px| missed.len() >= FEWEST && *px > FAR * usual_px)?;
-        Some(format!("tag {tag} by {px:.2} px"))
+        Some(format!("{tag} by {px:.2} px"))
     };
     let moved: Vec<String> = by_tag.iter().filter_map(far).collect();
     (!moved.is_empty()).then(|| {
         format!(
-            "where the board has them there are not: {} in half of the pictures, and {usual_px:.3} px of all corners. They were moved or printed elsewhere; \
-             cover them, or print the board anew",
+            "tags that are not where the board has them: {} (median over the pictures; of all corners {usual_px:.3} px). They were moved or printed \
+             elsewhere: cover them, or print the board anew",
             moved.join(", ")
         )
     })
