@@ -43,7 +43,7 @@ pub enum Kind {
         layout: Option<Layout>,
         /// By how much each side of a tag of OpenCV's grid is printed farther out than it is drawn, mm: what black runs. Where two black squares meet it
         /// moves nothing.
-        spread_mm: f64,
+        spread_mm: f32,
     },
 }
 
@@ -89,7 +89,7 @@ impl Board {
                 Kind::Charuco { marker_mm: marker_mm * factor, dictionary, layout }
             }
             Kind::Tags { gap_mm, family, layout, spread_mm } => {
-                Kind::Tags { gap_mm: gap_mm * factor, family, layout, spread_mm: spread_mm * factor }
+                Kind::Tags { gap_mm: gap_mm * factor, family, layout, spread_mm: spread_mm * factor as f32 }
             }
         };
         Board { square_mm: self.square_mm * factor, kind, ..self }
@@ -129,7 +129,7 @@ impl Board {
     /// How far black has spread, mm; zero where it moves no corner.
     pub fn spread_mm(&self) -> f64 {
         match self.kind {
-            Kind::Tags { spread_mm, .. } => spread_mm,
+            Kind::Tags { spread_mm, .. } => f64::from(spread_mm),
             _ => 0.0,
         }
     }
@@ -138,7 +138,7 @@ impl Board {
     pub fn with_spread_mm(self, spread_mm: f64) -> Board {
         let Kind::Tags { gap_mm, family, layout, .. } = self.kind else { return self };
         let steps = 10f64.powi((1e-5 * self.square_mm).log10().floor() as i32).recip();
-        let spread_mm = (spread_mm * steps).round() / steps;
+        let spread_mm = ((spread_mm * steps).round() / steps) as f32;
         Board { kind: Kind::Tags { gap_mm, family, layout, spread_mm }, ..self }
     }
 

@@ -5,7 +5,7 @@
 //! each says that the others are is where they must be: a tag that most of those round it do not confirm is none of the board's, or has been moved.
 //! Goes wrong: a single tag, which nothing confirms; tags whose outline is cut off by the picture's border.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point2};
 
@@ -287,7 +287,7 @@ fn judged(picture: &Picture, board: &Board, tags: &[Tag], (level, copy): (Level,
     let mut by_number: BTreeMap<usize, usize> = BTreeMap::new();
     for &i in &kept {
         if by_number.insert(tags[i].number, i).is_some() {
-            return Seen::Other("shows two boards with the same markers: cover one of them".to_owned().into());
+            return Seen::Other(TWO_BOARDS.to_owned().into());
         }
     }
     if by_number.keys().any(|number| *number >= columns * rows) {
@@ -312,6 +312,8 @@ fn laid(board: &Board, tags: &[Tag], by_number: &BTreeMap<usize, usize>, upside_
     })
 }
 
+const TWO_BOARDS: &str = "shows two boards with the same markers: cover one of them";
+
 /// Why tags are none of the board's.
 fn unlike(board: &Board, tags: &[Tag], others: impl Iterator<Item = Order>) -> Seen {
     let best = others.filter(|order| order.is_sure(tags.len().max(2))).max_by_key(|order| order.confirmed.len());
@@ -324,8 +326,11 @@ fn unlike(board: &Board, tags: &[Tag], others: impl Iterator<Item = Order>) -> S
         let squares = Squares { columns: 2 * other.columns + 1, ..board.squares };
         return Seen::Other(Refusal { reason, seen: Some(Board { squares, ..*board }) });
     }
+    let numbers: BTreeSet<usize> = tags.iter().map(|tag| tag.number).collect();
     match tags.len() {
         0 | 1 => Seen::Nothing,
+        // Most numbers stand there twice.
+        count if 2 * (count - numbers.len()) > numbers.len() => Seen::Other(TWO_BOARDS.to_owned().into()),
         count => {
             let reason = format!(
                 "shows {count} tags of the board, in another order or at other distances than {board} has them"
