@@ -38,11 +38,12 @@ fn a_grid_is_measured_from_every_side_whether_or_not_its_layout_is_said() {
         let turn = [0.3, -0.25, 0.2 + f64::from(quarter) * 1.6];
         let (picture, truth) = Shot::of(GRID, turn, [3.0, -2.0, 380.0]).taken();
         let (count, chi2) = measured(GRID, &picture, &truth);
-        // A corner whose window holds too little beside the tag's bits is left out.
-        assert!(count >= 72 && chi2 < 1.5, "{quarter}: {count} of 80 corners, {chi2}");
+        // From one of the sides a tag is missed; none is measured wrongly.
+        assert!(count >= 76 && chi2 < 1.5, "{quarter}: {count} of 80 corners, {chi2}");
         sum += chi2 / 4.0;
         let seen = seen_in(&picture, UNSAID.parse().unwrap()).unwrap();
-        assert_eq!((seen.print.unwrap().layout, seen.corners.count()), (Layout::Grid, 80), "{quarter}");
+        let (layout, found) = (seen.print.unwrap().layout, seen.corners.count());
+        assert!(layout == Layout::Grid && found >= 76, "{quarter}: {layout:?}, {found} of 80 corners");
     }
     assert!((0.75..1.25).contains(&sum), "{sum}");
 }
