@@ -1,6 +1,6 @@
-//! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others best.
+//! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others best; convex hulls in the plane.
 
-use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// A rigid transform, named `a_from_b` where it is bound.
 pub type Transform = Isometry3<f64>;
@@ -130,6 +130,34 @@ fn sharpened(mut rotation: Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> 
         }
     }
     rotation
+}
+
+/// Twice the area of a triangle, positive where its corners turn left with y up, or clockwise as it is seen with y down.
+pub fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
+    (b - a).perp(&(c - a))
+}
+
+/// The convex hull of some points, its corners in the order in which [`turn`] is positive (Andrew's monotone chain, 1979).
+pub fn convex_hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let mut hull = chain(points.iter());
+    hull.extend(chain(points.iter().rev()));
+    hull
+}
+
+/// Half of the hull, without its last point.
+fn chain<'a>(sorted: impl Iterator<Item = &'a Point2<f64>>) -> Vec<Point2<f64>> {
+    let mut chain: Vec<Point2<f64>> = Vec::new();
+    for point in sorted {
+        while let [.., a, b] = chain[..]
+            && turn(&a, &b, point) <= 0.0
+        {
+            chain.pop();
+        }
+        chain.push(*point);
+    }
+    chain.pop();
+    chain
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@
 
 use nalgebra::{Point2, Vector2};
 
+use crate::geometry::{convex_hull, turn};
 use crate::imaging::image::Grey8;
 
 /// Side of the tiles whose darkest and lightest pixels are looked at, px: with the tiles round it one spans an edge of three of its sides.
@@ -128,31 +129,6 @@ fn shapes(dark: &[bool], width: usize) -> Vec<Shape> {
     shapes
 }
 
-fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
-    (b - a).perp(&(c - a))
-}
-
-/// The convex hull, clockwise as it is seen (Andrew 1979).
-fn hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
-    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-    let half = |points: &mut dyn Iterator<Item = &Point2<f64>>| {
-        let mut chain: Vec<Point2<f64>> = Vec::new();
-        for p in points {
-            while let [.., a, b] = chain[..]
-                && turn(&a, &b, p) <= 0.0
-            {
-                chain.pop();
-            }
-            chain.push(*p);
-        }
-        chain.pop();
-        chain
-    };
-    let mut all = half(&mut points.iter());
-    all.extend(half(&mut points.iter().rev()));
-    all
-}
-
 fn area(outline: &[Point2<f64>]) -> f64 {
     let next = outline.iter().cycle().skip(1);
     0.5 * outline.iter().zip(next).map(|(a, b)| a.coords.perp(&b.coords)).sum::<f64>()
@@ -161,7 +137,7 @@ fn area(outline: &[Point2<f64>]) -> f64 {
 /// The four corners of a shape; `None` where it has others.
 fn quad(shape: &Shape) -> Option<Quad> {
     let points = &shape.points;
-    let hull = hull(points.clone());
+    let hull = convex_hull(points.clone());
     let rough = corners_of(&hull)?;
     let filled = area(&rough) / area(&hull);
     if filled.is_nan() || filled < LEAST_FILLED {

@@ -3,6 +3,8 @@
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};
 
+use crate::geometry::{convex_hull, turn};
+
 /// A convex polygon, its points in order; empty for fewer than three points.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
@@ -23,14 +25,9 @@ impl From<Hull> for Vec<[f64; 2]> {
 }
 
 impl Hull {
-    /// The convex hull of some points (Andrew's monotone chain).
+    /// The convex hull of some points.
     pub fn of(points: impl IntoIterator<Item = Point2<f64>>) -> Hull {
-        let mut sorted: Vec<Point2<f64>> = points.into_iter().collect();
-        sorted.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
-        let mut lower = chain(sorted.iter());
-        let upper = chain(sorted.iter().rev());
-        lower.extend(upper);
-        Hull { points: lower }
+        Hull { points: convex_hull(points.into_iter().collect()) }
     }
 
     /// Its points in order.
@@ -43,26 +40,6 @@ impl Hull {
         let count = self.points.len();
         count >= 3 && (0..count).all(|i| turn(&self.points[i], &self.points[(i + 1) % count], at) >= 0.0)
     }
-}
-
-/// Half of the hull, without its last point.
-fn chain<'a>(sorted: impl Iterator<Item = &'a Point2<f64>>) -> Vec<Point2<f64>> {
-    let mut chain: Vec<Point2<f64>> = Vec::new();
-    for point in sorted {
-        while let [.., a, b] = chain[..]
-            && turn(&a, &b, point) <= 0.0
-        {
-            chain.pop();
-        }
-        chain.push(*point);
-    }
-    chain.pop();
-    chain
-}
-
-/// Twice the area of a triangle, positive where its corners turn left (with y up).
-fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
-    (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x)
 }
 
 #[cfg(test)]
