@@ -40,6 +40,7 @@ fn world() -> tempfile::TempDir {
 }
 
 #[test]
+#[ignore = "slow"]
 fn the_same_pictures_give_the_same_rig_whatever_their_names() {
     let folder = world();
     let root = folder.path();
@@ -81,6 +82,7 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
 }
 
 #[test]
+#[ignore = "slow"]
 fn measure_finds_the_poses_beside_two_folders() {
     let folder = workplace();
     let root = folder.path();
