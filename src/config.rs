@@ -139,7 +139,8 @@ impl BoardSettings {
         })
     }
 
-    /// The board, with what was given on the command line instead of the file's values: a board, or squares and their size.
+    /// The board, with what was given on the command line instead of the file's values: a board, or squares and their
+    /// size.
     pub fn board(&self, named: Option<Board>, squares: Option<Squares>, square_mm: Option<f64>) -> Result<Board> {
         let own = self.board;
         let board = named.unwrap_or(match (squares, square_mm) {

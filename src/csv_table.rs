@@ -1,8 +1,8 @@
 //! A table with a header: columns by name, every row as long as the header, complaints with the line.
 //!
-//! The file may have any form that [`crate::tables`] reads. Time and memory grow with the file's length alone, and there is an end to it:
-//! [`MOST_COLUMNS`], [`MOST_ROWS`]. Text cells that a spreadsheet would run as a formula are written with an apostrophe before them and read
-//! without.
+//! The file may have any form that [`crate::tables`] reads. Time and memory grow with the file's length alone, and
+//! there is an end to it: [`MOST_COLUMNS`], [`MOST_ROWS`]. Text cells that a spreadsheet would run as a formula are
+//! written with an apostrophe before them and read without.
 
 use std::collections::BTreeMap;
 
@@ -26,7 +26,8 @@ pub struct Table<'a> {
 }
 
 impl<'a> Table<'a> {
-    /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file without rows is refused.
+    /// Reads a whole file; `what` names it in the message when it is not there, `hint` says what makes it. A file
+    /// without rows is refused.
     pub fn read(path: &'a Utf8Path, what: &'static str, hint: &str) -> Result<Table<'a>> {
         let grid = Grid::read(path, what, hint)?;
         let mut rows = grid.rows.into_iter();
@@ -131,8 +132,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a name is made of, it reads back; blanks at its ends are lost, as they are in every cell that is read. Names that are numbers
-        /// in quotes with a decimal comma are read as these.
+        /// Whatever a name is made of, it reads back; blanks at its ends are lost, as they are in every cell that is
+        /// read. Names that are numbers in quotes with a decimal comma are read as these.
         #[test]
         fn names_read_back(names in prop::collection::vec("[-=+@',;\"\t\r\n a-c0\\\\é]{0,8}", 1..6)) {
             let trimmed: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();

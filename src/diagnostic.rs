@@ -86,8 +86,8 @@ pub fn capital(sentence: &str) -> String {
     chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
 }
 
-/// An error or an uncertainty as it is stated, with two significant digits: `0.0061`, `1.6`, `245`. Nothing finer than a nanometre (of mm) is told
-/// from zero; a value that is none is "n/a".
+/// An error or an uncertainty as it is stated, with two significant digits: `0.0061`, `1.6`, `245`. Nothing finer than
+/// a nanometre (of mm) is told from zero; a value that is none is "n/a".
 pub fn two_digits(value: f64) -> String {
     fixed(value, decimals_of(value))
 }
@@ -97,15 +97,16 @@ pub fn short(value: f64) -> String {
     format!("{value:.6e}").parse().unwrap_or(value).to_string()
 }
 
-/// Values of one kind below each other with the same decimals: two digits of those that are a tenth as large as the largest.
+/// Values of one kind below each other with the same decimals: two digits of those that are a tenth as large as the
+/// largest.
 pub fn aligned(values: &[Option<f64>]) -> Vec<String> {
     let largest = values.iter().flatten().filter(|v| v.is_finite()).fold(0.0_f64, |most, v| most.max(v.abs()));
     let decimals = if largest > 0.0 { (decimals_of(largest) + 1).min(FINEST) } else { 0 };
     values.iter().map(|value| fixed(value.unwrap_or(f64::NAN), decimals)).collect()
 }
 
-/// What something is at most, rounded up to three digits, and to more where these would put it beyond a limit that it is within. Two digits would say
-/// up to a tenth more than is known, beside a sum that says less.
+/// What something is at most, rounded up to three digits, and to more where these would put it beyond a limit that it
+/// is within. Two digits would say up to a tenth more than is known, beside a sum that says less.
 pub fn at_most(value: f64, limit: f64) -> String {
     let all = (decimals_of(value) + 1).min(FINEST)..FINEST;
     let decimals = all.into_iter().find(|&d| value > limit || rounded_up(value, d) <= limit).unwrap_or(FINEST);
@@ -118,7 +119,8 @@ fn rounded_up(value: f64, decimals: usize) -> f64 {
     (value * steps - 1e-6).ceil() / steps
 }
 
-/// Two lengths and their sum, which is rounded up, with the same decimals and so that what is written adds up: `[a, b, a + b]`.
+/// Two lengths and their sum, which is rounded up, with the same decimals and so that what is written adds up: `[a, b,
+/// a + b]`.
 pub fn summed(a: f64, b: f64) -> [String; 3] {
     let sum = a + b;
     if !sum.is_finite() {

@@ -1,8 +1,9 @@
 //! Numbers that are known twice: do both agree, and which change explains where they do not.
 //!
-//! In: the difference of two estimates of the same numbers with its covariance, and from how many pairs that is known. Out: tests of all numbers
-//! together (Hotelling) and of a change along one direction (Student), and what is left where some directions may take what they like.
-//! Goes wrong: a covariance that follows from fewer pairs than there are numbers; then all numbers together are not tested.
+//! In: the difference of two estimates of the same numbers with its covariance, and from how many pairs that is known.
+//! Out: tests of all numbers together (Hotelling) and of a change along one direction (Student), and what is left where
+//! some directions may take what they like. Goes wrong: a covariance that follows from fewer pairs than there are
+//! numbers; then all numbers together are not tested.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
@@ -10,13 +11,15 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor, StudentsT};
 /// Causes are told apart where the logarithm of one's likelihood is larger by this: 150 to 1.
 pub const TOLD_APART: f64 = 5.0;
 
-/// Quantile of the normal distribution for the share of changes that a test sees at the size that is stated: nineteen in twenty.
+/// Quantile of the normal distribution for the share of changes that a test sees at the size that is stated: nineteen
+/// in twenty.
 pub const SEEN: f64 = 1.645;
 
 /// Degrees of freedom from which on a covariance is as good as known.
 const KNOWN: f64 = 1e4;
 
-/// Two standard deviations of a variance that one pair tells, as a share; of many it is that over the root of their number.
+/// Two standard deviations of a variance that one pair tells, as a share; of many it is that over the root of their
+/// number.
 const HIDDEN: f64 = 1.5;
 
 /// The difference of two estimates.
@@ -32,7 +35,8 @@ pub struct Difference {
 /// A covariance, ready to be divided by.
 enum Joint {
     Whole(Cholesky<f64, Dyn>),
-    /// A unit matrix and the product of columns with themselves, of which there are few: these, and what they leave in their own coordinates (Woodbury).
+    /// A unit matrix and the product of columns with themselves, of which there are few: these, and what they leave in
+    /// their own coordinates (Woodbury).
     Beyond(DMatrix<f64>, Cholesky<f64, Dyn>),
 }
 
@@ -53,16 +57,17 @@ fn freedom(pairs: usize, scatter: f64) -> f64 {
 }
 
 impl Difference {
-    /// `scatter` is the variance in the covariance over that by the readings' noise, as so many units (pairs, poses) tell: of the part beyond one they know as
-    /// little as they are few, and of the rest much (Welch and Satterthwaite). Where no scatter was seen, as much as chance hides may be
-    /// there. `None` where the covariance is singular.
+    /// `scatter` is the variance in the covariance over that by the readings' noise, as so many units (pairs, poses)
+    /// tell: of the part beyond one they know as little as they are few, and of the rest much (Welch and
+    /// Satterthwaite). Where no scatter was seen, as much as chance hides may be there. `None` where the covariance is
+    /// singular.
     pub fn new(off: DVector<f64>, joint: &DMatrix<f64>, pairs: usize, scatter: f64) -> Option<Difference> {
         let joint = Joint::Whole((0.5 * (joint + joint.transpose())).cholesky()?);
         Some(Difference { off, joint, freedom: freedom(pairs, scatter), is_sized: false })
     }
 
-    /// The same of numbers that are known to a unit each, and beside that to the product of these columns with themselves. How large that unit is,
-    /// so many degrees of freedom tell.
+    /// The same of numbers that are known to a unit each, and beside that to the product of these columns with
+    /// themselves. How large that unit is, so many degrees of freedom tell.
     pub fn of_white(off: DVector<f64>, columns: DMatrix<f64>, freedom: f64) -> Option<Difference> {
         let (numbers, count) = columns.shape();
         if numbers <= count {
@@ -83,7 +88,8 @@ impl Difference {
         a.dot(&self.joint.solve(b))
     }
 
-    /// What it stays within but for this chance, where so many numbers are free to differ; infinite where too few pairs tell.
+    /// What it stays within but for this chance, where so many numbers are free to differ; infinite where too few pairs
+    /// tell.
     pub fn limit(&self, numbers: usize, chance: f64) -> f64 {
         let (p, n) = (numbers as f64, self.freedom);
         let inner = if self.is_sized { n } else { n - p + 1.0 };
@@ -124,7 +130,8 @@ impl Difference {
         Some((matrix.cholesky()?.solve(&right), right))
     }
 
-    /// Logarithm of the likelihood, but for a constant, of a change that leaves so much (the multivariate distribution of Student).
+    /// Logarithm of the likelihood, but for a constant, of a change that leaves so much (the multivariate distribution
+    /// of Student).
     pub fn log_likelihood(&self, left: f64) -> f64 {
         -0.5 * (self.freedom + self.off.len() as f64) * (left / self.freedom).ln_1p()
     }

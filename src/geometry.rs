@@ -1,4 +1,5 @@
-//! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others best; convex hulls in the plane.
+//! Rigid transforms as the rest of the program writes them, on top of nalgebra; the one that brings points onto others
+//! best; convex hulls in the plane.
 
 use nalgebra::{Isometry3, Matrix3, Matrix3x6, Point2, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -25,8 +26,8 @@ pub fn transform_from_matrix(rotation: Matrix3<f64>, t_mm: Vector3<f64>) -> Tran
     Isometry3::from_parts(Translation3::from(t_mm), rotation)
 }
 
-/// The rotation vector of a rotation matrix, rad. Not from the arc cosine of the trace, which has half the digits near zero
-/// and is no number where rounding makes the trace larger than three.
+/// The rotation vector of a rotation matrix, rad. Not from the arc cosine of the trace, which has half the digits near
+/// zero and is no number where rounding makes the trace larger than three.
 pub fn rotation_vector_of_matrix(rotation: &Matrix3<f64>) -> Vector3<f64> {
     /// Square of the sine up to which a turn is small enough for a short series.
     const SMALL_SINE_SQUARED: f64 = 1e-3;
@@ -44,8 +45,8 @@ fn twist(m: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(m[(2, 1)] - m[(1, 2)], m[(0, 2)] - m[(2, 0)], m[(1, 0)] - m[(0, 1)])
 }
 
-/// Applies a small change, the first six numbers of `delta`: `exp` of three (rad) on the left of the rotation, three (mm) added to the
-/// translation.
+/// Applies a small change, the first six numbers of `delta`: `exp` of three (rad) on the left of the rotation, three
+/// (mm) added to the translation.
 pub fn perturb(a_from_b: &Transform, delta: &[f64]) -> Transform {
     let [delta_r_rad, delta_t_mm] = [&delta[..3], &delta[3..6]].map(Vector3::from_column_slice);
     let mut rotation = UnitQuaternion::from_scaled_axis(delta_r_rad) * a_from_b.rotation;
@@ -112,8 +113,8 @@ pub fn nearest_rotation(matrix: &Matrix3<f64>) -> Matrix3<f64> {
     sharpened(u * sign * v_t, matrix)
 }
 
-/// The rotation near one that has the largest trace, to its last digits: the decomposition of a matrix with a small singular value, as points on
-/// a line have, goes by squares and loses half of them.
+/// The rotation near one that has the largest trace, to its last digits: the decomposition of a matrix with a small
+/// singular value, as points on a line have, goes by squares and loses half of them.
 fn sharpened(mut rotation: Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> {
     /// Rotations are known to this, rad, where nothing was lost.
     const KNOWN_RAD: f64 = 1e-12;
@@ -132,12 +133,14 @@ fn sharpened(mut rotation: Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> 
     rotation
 }
 
-/// Twice the area of a triangle, positive where its corners turn left with y up, or clockwise as it is seen with y down.
+/// Twice the area of a triangle, positive where its corners turn left with y up, or clockwise as it is seen with y
+/// down.
 pub fn turn(a: &Point2<f64>, b: &Point2<f64>, c: &Point2<f64>) -> f64 {
     (b - a).perp(&(c - a))
 }
 
-/// The convex hull of some points, its corners in the order in which [`turn`] is positive (Andrew's monotone chain, 1979).
+/// The convex hull of some points, its corners in the order in which [`turn`] is positive (Andrew's monotone chain,
+/// 1979).
 pub fn convex_hull(mut points: Vec<Point2<f64>>) -> Vec<Point2<f64>> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let mut hull = chain(points.iter());

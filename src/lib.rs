@@ -17,7 +17,8 @@
 //!
 //! # Example
 //!
-//! A robot that is off by half a millimetre and half a degree, measured at forty poses by a sensor that stands somewhere, and found again:
+//! A robot that is off by half a millimetre and half a degree, measured at forty poses by a sensor that stands
+//! somewhere, and found again:
 //!
 //! ```
 //! use stereocal::measurements::{Measurement, Observed, RobotPose, Role};
@@ -45,8 +46,8 @@
 //! # Ok::<(), stereocal::Error>(())
 //! ```
 //!
-//! What stands below is what other programs may use. Everything else that is public is so for the command and for the tests of this
-//! repository, is not documented here, and may change with any version.
+//! What stands below is what other programs may use. Everything else that is public is so for the command and for the
+//! tests of this repository, is not documented here, and may change with any version.
 #![doc = include_str!("CONVENTIONS.md")]
 
 #[doc(hidden)]

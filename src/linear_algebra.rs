@@ -1,20 +1,21 @@
 //! Products and inverses of dense matrices as least squares need them.
 //!
-//! Rank is treated in one way: a symmetric matrix is brought to a unit diagonal, so that radians and mm are comparable, and what it says along
-//! eigenvectors below `RANK` is nothing. Such directions stay where they are.
+//! Rank is treated in one way: a symmetric matrix is brought to a unit diagonal, so that radians and mm are comparable,
+//! and what it says along eigenvectors below `RANK` is nothing. Such directions stay where they are.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dim, Matrix, RawStorage, SymmetricEigen};
 
 /// Relative size below which an eigenvalue of a normal matrix counts as zero.
 const RANK: f64 = 1e-13;
 
-/// `A' B`, by way of the blocked product: `tr_mul` takes dot products one by one, at several times the time for matrices of this size.
+/// `A' B`, by way of the blocked product: `tr_mul` takes dot products one by one, at several times the time for
+/// matrices of this size.
 pub fn product(a: &DMatrix<f64>, b: &DMatrix<f64>) -> DMatrix<f64> {
     a.transpose() * b
 }
 
-/// A symmetric matrix with rows of different units brought to a unit diagonal, and the factors of its rows and columns that do it. `None` where an
-/// element of the diagonal is not above zero.
+/// A symmetric matrix with rows of different units brought to a unit diagonal, and the factors of its rows and columns
+/// that do it. `None` where an element of the diagonal is not above zero.
 pub fn to_unit_diagonal(matrix: &DMatrix<f64>) -> Option<(DMatrix<f64>, DVector<f64>)> {
     let scale = matrix.diagonal().map(|d| 1.0 / d.sqrt());
     let scaled = || DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);

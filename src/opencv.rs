@@ -20,9 +20,10 @@ impl From<opencv::Error> for Failure {
     }
 }
 
-/// Looks for a board with `columns` x `rows` inner corners by sectors (Duda and Frese 2018): slow, holds against blur and noise. Gives all
-/// corners row by row, to about half a pixel, in a direction of OpenCV's choosing; `None` where the whole board was not found.
-/// At least three corners each way. `grey` holds the picture's lines of `width` pixels one after the other.
+/// Looks for a board with `columns` x `rows` inner corners by sectors (Duda and Frese 2018): slow, holds against blur
+/// and noise. Gives all corners row by row, to about half a pixel, in a direction of OpenCV's choosing; `None` where
+/// the whole board was not found. At least three corners each way. `grey` holds the picture's lines of `width` pixels
+/// one after the other.
 pub fn find_board(
     grey: &[u8],
     width: usize,
@@ -60,8 +61,8 @@ pub struct Lens<'a> {
 /// What `stereoRectify` gives: `R1` and `R2`, `P1` and `P2`, `Q`.
 pub type Rectified = ([Matrix3<f64>; 2], [Matrix3x4<f64>; 2], Matrix4<f64>);
 
-/// OpenCV's `stereoRectify` (Bouguet's method) for pictures of the first camera's size: `rotation` and `translation` (mm) take points from the
-/// first camera's frame to the second's.
+/// OpenCV's `stereoRectify` (Bouguet's method) for pictures of the first camera's size: `rotation` and `translation`
+/// (mm) take points from the first camera's frame to the second's.
 pub fn stereo_rectify(
     [first, second]: [Lens; 2],
     rotation: &Matrix3<f64>,
@@ -85,7 +86,8 @@ pub fn stereo_rectify(
     ))
 }
 
-/// OpenCV's `undistortPoints` of raw pixels, to places at distance one. It takes five steps of an iteration that need not arrive.
+/// OpenCV's `undistortPoints` of raw pixels, to places at distance one. It takes five steps of an iteration that need
+/// not arrive.
 pub fn undistort_points(camera: &Lens, px: &[Point2<f64>]) -> Result<Vec<Point2<f64>>, Failure> {
     hold_to_one_thread();
     let (m, d) = camera.mats()?;
@@ -115,8 +117,9 @@ impl Map {
         count as f64 / self.x.len().max(1) as f64
     }
 
-    /// Empties what a lens model that folds shows a second time: all beyond the line where the map turns back, seen from the pixel that lies nearest
-    /// to `centre_px` of the raw picture. The share of the pixels within a raw picture of this size that this takes.
+    /// Empties what a lens model that folds shows a second time: all beyond the line where the map turns back, seen
+    /// from the pixel that lies nearest to `centre_px` of the raw picture. The share of the pixels within a raw picture
+    /// of this size that this takes.
     pub fn empty_folds(&mut self, centre_px: &Point2<f64>, (width, height): (u32, u32)) -> f64 {
         /// Outside of any picture.
         const NOWHERE: f32 = -1e6;
@@ -185,8 +188,8 @@ pub fn undistort_rectify_map(
     Ok(Map { width: width as usize, x: x.data_typed()?.to_vec(), y: y.data_typed()?.to_vec() })
 }
 
-/// The picture at the places of a map, by OpenCV's `remap`, bicubic; black where the map leaves the picture. `samples` holds its lines of `width`
-/// pixels one after the other, each pixel's channels together.
+/// The picture at the places of a map, by OpenCV's `remap`, bicubic; black where the map leaves the picture. `samples`
+/// holds its lines of `width` pixels one after the other, each pixel's channels together.
 pub fn remap<T: DataType>(samples: &[T], width: usize, channels: usize, map: &Map) -> Result<Vec<T>, Failure> {
     hold_to_one_thread();
     let (columns, depth) = (width * channels, channels as i32);

@@ -1,8 +1,8 @@
 //! What a person sees on stderr while a command runs: bars, notes and warnings.
 //!
-//! On a terminal a step is a bar with its name, a count and the time left; elsewhere, and where `NO_COLOR` or `TERM=dumb` ask for
-//! plain text, a line every few seconds. `--quiet` leaves warnings and errors alone. Nothing is said twice. A stderr that
-//! cannot be written, closed or full, is no reason to stop: the results are files.
+//! On a terminal a step is a bar with its name, a count and the time left; elsewhere, and where `NO_COLOR` or
+//! `TERM=dumb` ask for plain text, a line every few seconds. `--quiet` leaves warnings and errors alone. Nothing is
+//! said twice. A stderr that cannot be written, closed or full, is no reason to stop: the results are files.
 
 use std::collections::BTreeSet;
 use std::io::{IsTerminal, Write};
@@ -55,7 +55,8 @@ pub fn bar(label: &str, length: u64) -> Step {
     Step { bar, begun: AtomicBool::new(false), ticker }
 }
 
-/// Says a line now and then where more is done: while one part takes long, the time left that the others tell only grows.
+/// Says a line now and then where more is done: while one part takes long, the time left that the others tell only
+/// grows.
 fn ticker(bar: ProgressBar) -> Option<(Sender<()>, JoinHandle<()>)> {
     let (stop, stopped) = channel();
     let thread = std::thread::Builder::new().spawn(move || {

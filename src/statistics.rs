@@ -1,4 +1,5 @@
-//! The median, quantiles of the distributions that tests compare with, and what a repeatability is in standard deviations.
+//! The median, quantiles of the distributions that tests compare with, and what a repeatability is in standard
+//! deviations.
 
 /// The middle one of the numbers, the upper of two; `None` where there is none.
 pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
@@ -14,8 +15,8 @@ pub const NORMAL_999: f64 = 3.0902;
 /// normal coordinates of standard deviation s that is (1.596 + 3 * 0.673) s.
 pub const RP_OVER_SIGMA: f64 = 3.616;
 
-/// Quantile of chi-square at the level of a quantile of the normal distribution (Wilson and Hilferty 1931; 3 % too large at one degree of
-/// freedom and 99.9 %, less elsewhere).
+/// Quantile of chi-square at the level of a quantile of the normal distribution (Wilson and Hilferty 1931; 3 % too
+/// large at one degree of freedom and 99.9 %, less elsewhere).
 pub fn chi_square_quantile(freedom: f64, normal: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     freedom * (1.0 - spread + normal * spread.sqrt()).powi(3)

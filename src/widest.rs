@@ -1,7 +1,8 @@
 //! Loops over many numbers with the widest registers that the processor has.
 //!
-//! In: the work, as a closure that is inlined with all that it calls in its loops. Out: its result, the same to the bit on every processor:
-//! the arithmetic is the same, only more numbers are worked on at once. Goes wrong: what is not inlined is slower, not different.
+//! In: the work, as a closure that is inlined with all that it calls in its loops. Out: its result, the same to the bit
+//! on every processor: the arithmetic is the same, only more numbers are worked on at once. Goes wrong: what is not
+//! inlined is slower, not different.
 
 /// Does the work.
 #[inline(always)]

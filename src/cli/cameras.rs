@@ -51,7 +51,8 @@ impl Pairs {
 /// `stereocal camera-check`
 #[derive(Debug, Args)]
 pub struct CameraCheck {
-    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
+    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's,
+    /// before RIGHT
     #[arg(required_unless_present = "corners", conflicts_with = "corners")]
     pub images: Option<Utf8PathBuf>,
     #[command(flatten)]
@@ -59,48 +60,53 @@ pub struct CameraCheck {
     /// Corners from a CSV file instead of pictures
     #[arg(long, value_name = "FILE")]
     pub corners: Option<Utf8PathBuf>,
-    /// The check board by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm); or a
-    /// file: Kalibr's target.yaml, a project of calib.io's Calibrator (.json), calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
+    /// The check board by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker
+    /// in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm);
+    /// or a file: Kalibr's target.yaml, a project of calib.io's Calibrator (.json),
+    /// calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
-    /// Squares of the check board, not inner corners, or `auto`: counted where pictures show all of a checkerboard; key `check_board.squares`
-    /// [default: 20x20]
+    /// Squares of the check board, not inner corners, or `auto`: counted where pictures show all of a checkerboard; key
+    /// `check_board.squares` [default: 20x20]
     #[arg(long, value_name = "CxR")]
     pub squares: Option<AskedSquares>,
     /// Side of a square, mm; key `check_board.square_mm` [default: 10]
     #[arg(long, alias = "square", value_name = "MM", allow_negative_numbers = true, value_parser = within(&SQUARES_MM))]
     pub square_mm: Option<f64>,
-    /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square to that of the last
-    /// (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict, where --board-uncertainty-mm says no other
+    /// The print by a caliper, mm: its width along the columns and its height, from the outer edge of the first square
+    /// to that of the last (149.7x99.8). Both are scales of their own; the caliper's uncertainty counts in the verdict,
+    /// where --board-uncertainty-mm says no other
     #[arg(long, value_name = "WxH")]
     pub measured_mm: Option<PrintedExtent>,
-    /// A slide of the board by a known length (a gauge block, a micrometer), mm, photographed before and after: checks the scale by something that
-    /// is not the board. With its uncertainty (k = 2; 0.002 where none is said) and the names of both pairs, where not just two pairs in a row show
-    /// such a move: 5mm+-0.003:03,04. May be given again
+    /// A slide of the board by a known length (a gauge block, a micrometer), mm, photographed before and after: checks
+    /// the scale by something that is not the board. With its uncertainty (k = 2; 0.002 where none is said) and the
+    /// names of both pairs, where not just two pairs in a row show such a move: 5mm+-0.003:03,04. May be given again
     #[arg(long, value_name = "MM[+-U][:FIRST,SECOND]", allow_negative_numbers = true)]
     pub known_move: Vec<StatedMove>,
     /// Largest length error that passes, mm; key `tolerance_mm` [default: 0.05; with --against that of the calibration]
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub tolerance_mm: Option<f64>,
-    /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the verdict
+    /// Expanded uncertainty (k = 2) of the board's lengths, from its certificate, mm: widens the guard band of the
+    /// verdict
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = within(&TOLERANCES_MM))]
     pub board_uncertainty_mm: Option<f64>,
     /// Lens model: radial2, brown4, brown5, rational8, thin-prism12 or tilted14 [default: chosen by held-out pairs]
     #[arg(long, value_name = "NAME", value_parser = lens)]
     pub lens: Option<Lens>,
-    /// Lenses that are known: a calibration of this program, OpenCV, ROS, Kalibr or mrcal, and `,left` or `,right` behind it where it is for one
-    /// camera; only the rig is looked for, and three pairs are enough for that (ten make the held-out figures reliable)
+    /// Lenses that are known: a calibration of this program, OpenCV, ROS, Kalibr or mrcal, and `,left` or `,right`
+    /// behind it where it is for one camera; only the rig is looked for, and three pairs are enough for that (ten make
+    /// the held-out figures reliable)
     #[arg(long, value_name = "FILE[,SIDE]")]
     pub intrinsics: Vec<LensFile>,
-    /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the pairs would have shown
+    /// Whether this calibration still holds, by two or more new pairs: what changed, by how much a length, and what the
+    /// pairs would have shown
     #[arg(long, value_name = "CALIBRATION", conflicts_with_all = ["lens", "intrinsics", "since", "volume", "board_shape", "board_uncertainty_mm", "measured_mm", "known_move", "check_images", "draw"])]
     pub against: Option<Utf8PathBuf>,
     /// Only the pairs from this one on, by name: the rig as it is since then
     #[arg(long, value_name = "PAIR")]
     pub since: Option<String>,
-    /// The volume that the verdict is for: `all` of what both cameras see, or a box X0,Y0,Z0,X1,Y1,Z1 in mm in the left camera's frame
-    /// [default: where the boards were]
+    /// The volume that the verdict is for: `all` of what both cameras see, or a box X0,Y0,Z0,X1,Y1,Z1 in mm in the left
+    /// camera's frame [default: where the boards were]
     #[arg(long, value_name = "VOLUME", allow_hyphen_values = true)]
     pub volume: Option<Extent>,
     /// Whether the board may be bowed [default: as held-out pairs say; flat where --lens is given]
@@ -149,8 +155,8 @@ pub enum BoardShape {
 /// `stereocal measure`
 #[derive(Debug, Args)]
 pub struct Measure {
-    /// Folder with the pictures, as for camera-check, and poses.csv; or the left camera's, before RIGHT: poses.csv is then beside the
-    /// two folders, or in one of them
+    /// Folder with the pictures, as for camera-check, and poses.csv; or the left camera's, before RIGHT: poses.csv is
+    /// then beside the two folders, or in one of them
     pub poses: Utf8PathBuf,
     #[command(flatten)]
     pub pairs: Pairs,
@@ -175,7 +181,8 @@ pub struct Measure {
 /// `stereocal rectify`
 #[derive(Debug, Args)]
 pub struct Rectify {
-    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's, before RIGHT
+    /// Folder with a folder of pictures for each camera, or with names that say left or right; or the left camera's,
+    /// before RIGHT
     pub images: Utf8PathBuf,
     #[command(flatten)]
     pub pairs: Pairs,
@@ -188,13 +195,14 @@ pub struct Rectify {
     /// How much is kept: 0 only what both lenses saw, 1 every raw pixel [default: OpenCV's own choice between]
     #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = between(0.0, 1.0))]
     pub alpha: Option<f64>,
-    /// Give both pictures one principal point: points at infinity then have no disparity, but cameras that are turned towards
-    /// each other lose what is near from view
+    /// Give both pictures one principal point: points at infinity then have no disparity, but cameras that are turned
+    /// towards each other lose what is near from view
     #[arg(long)]
     pub zero_disparity: bool,
-    /// The board by which the rows are compared, by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm) [default: the board
-    /// that calibrated, else those of the keys `check_board` and `target_board`]
+    /// The board by which the rows are compared, by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100
+    /// (columns, rows, square and marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of
+    /// tags, family, tag and gap in mm) [default: the board that calibrated, else those of the keys `check_board` and
+    /// `target_board`]
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares"])]
     pub board: Option<Board>,
     /// Squares of the board by which the rows are compared

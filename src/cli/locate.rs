@@ -9,7 +9,8 @@ use super::robot::TableFlags;
 /// `stereocal locate`
 #[derive(Debug, Args)]
 pub struct Locate {
-    /// Poses: a folder with pictures and poses.csv, which is measured first, or a table of measurements as `identify` reads it.
+    /// Poses: a folder with pictures and poses.csv, which is measured first, or a table of measurements as `identify`
+    /// reads it.
     #[command(flatten)]
     pub measure: Measure,
     /// The robot, taken as it is: identified.toml, or a nominal one that is trusted

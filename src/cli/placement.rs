@@ -23,7 +23,8 @@ pub struct ExportPlacement {
     /// Name of the flange's frame
     #[arg(long, value_name = "NAME", default_value = "tool0")]
     pub flange_frame: String,
-    /// Name of the left camera's optical frame [default: left_camera_optical_frame; instrument where no cameras measured]
+    /// Name of the left camera's optical frame [default: left_camera_optical_frame; instrument where no cameras
+    /// measured]
     #[arg(long, value_name = "NAME")]
     pub camera_frame: Option<String>,
     /// Name of the target's frame

@@ -10,7 +10,8 @@ use super::values::{between, number, whole, whole_between};
 /// `stereocal identify`
 #[derive(Debug, Args)]
 pub struct Identify {
-    /// Measurements: CSV with any delimiter, xlsx, xls, ods (FILE#SHEET), program lines; repeat for files that complete each other or are stacked [default: measurements.csv in the results folder]
+    /// Measurements: CSV with any delimiter, xlsx, xls, ods (FILE#SHEET), program lines; repeat for files that complete
+    /// each other or are stacked [default: measurements.csv in the results folder]
     #[arg(long, value_name = "FILE")]
     pub measurements: Vec<Utf8PathBuf>,
     #[command(flatten)]
@@ -43,10 +44,12 @@ pub struct Identify {
 /// What is known of a table that people have.
 #[derive(Debug, Clone, Args)]
 pub struct TableFlags {
-    /// What the columns are, in their order, those of all files side by side: j1,j2,...,-,x,y,z; `-` skips one; key `measurements.columns`
+    /// What the columns are, in their order, those of all files side by side: j1,j2,...,-,x,y,z; `-` skips one; key
+    /// `measurements.columns`
     #[arg(long, value_name = "NAME,NAME,...", allow_hyphen_values = true)]
     pub columns: Option<String>,
-    /// Units of joints and lengths: deg or rad, mm, cm, m, um or in; key `measurements.units` [default: what the names say, else what fits the nominal robot]
+    /// Units of joints and lengths: deg or rad, mm, cm, m, um or in; key `measurements.units` [default: what the names
+    /// say, else what fits the nominal robot]
     #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
     pub units: Option<String>,
 }
@@ -62,10 +65,12 @@ pub struct Verify {
     /// A robot to judge; repeat for more
     #[arg(long, value_name = "FILE", required_unless_present = "against")]
     pub robot: Vec<Utf8PathBuf>,
-    /// Is this robot, with its identification.json beside it, still the one of some ten new poses? Nothing else is judged
+    /// Is this robot, with its identification.json beside it, still the one of some ten new poses? Nothing else is
+    /// judged
     #[arg(long, value_name = "IDENTIFIED", conflicts_with_all = ["robot", "known_distances"])]
     pub against: Option<Utf8PathBuf>,
-    /// With --against: how far the target may move, mm [default: key `tolerance_mm`, or what 95 % of the errors were stated to be below, where that is more]
+    /// With --against: how far the target may move, mm [default: key `tolerance_mm`, or what 95 % of the errors were
+    /// stated to be below, where that is more]
     #[arg(long, value_name = "MM", requires = "against", allow_negative_numbers = true, value_parser = between(1e-4, 1e3))]
     pub tolerance_mm: Option<f64>,
     /// With --against: where the sensor stands by now, as `locate` found it [default: placement.json beside the robot]
@@ -130,7 +135,8 @@ pub struct Plan {
     /// How far off its place the target may be and still be seen whole, mm
     #[arg(long, value_name = "MM", default_value_t = 8.0, allow_negative_numbers = true, value_parser = between(0.0, 1e3))]
     pub margin_mm: f64,
-    /// Standard deviation of a coordinate of the measured point, mm [default: from the rig's corners and the repeatability]
+    /// Standard deviation of a coordinate of the measured point, mm [default: from the rig's corners and the
+    /// repeatability]
     #[arg(long, value_name = "MM", allow_negative_numbers = true, value_parser = between(1e-6, 100.0))]
     pub noise_mm: Option<f64>,
     /// Pose repeatability (ISO 9283 RP), mm
@@ -147,8 +153,9 @@ pub struct Plan {
     /// Pulses a degree of each joint: the Yaskawa job is then in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     pub pulses_per_deg: Vec<f64>,
-    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
-    /// with more than six joints it is needed for programs in makers' languages with six axes and then external ones
+    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the
+    /// third joint; with more than six joints it is needed for programs in makers' languages with six axes and then
+    /// external ones
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = whole::<usize>)]
     pub joint_order: Vec<usize>,
     #[command(flatten)]
@@ -167,8 +174,8 @@ pub enum PlanKind {
 /// `stereocal compensate`
 #[derive(Debug, Args)]
 pub struct Compensate {
-    /// Targets written for the nominal robot: a CSV of name and j1_deg.. or x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad (root_from_tool), or a
-    /// program (.script, .mod, .src, .dat, .ls, .jbi)
+    /// Targets written for the nominal robot: a CSV of name and j1_deg.. or x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad
+    /// (root_from_tool), or a program (.script, .mod, .src, .dat, .ls, .jbi)
     pub targets: Utf8PathBuf,
     /// The nominal robot that the targets were written for
     #[arg(long, value_name = "FILE")]
@@ -182,11 +189,12 @@ pub struct Compensate {
     /// Pulses a degree of each joint, for Yaskawa jobs in pulses
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', allow_negative_numbers = true, value_parser = number)]
     pub pulses_per_deg: Vec<f64>,
-    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the third joint;
-    /// needed with more than six, as makers' languages have six axes and then external ones
+    /// Which joint of the robot file each number of a program's target is, as in 1,2,4,5,6,7,3 where the seventh is the
+    /// third joint; needed with more than six, as makers' languages have six axes and then external ones
     #[arg(long, value_name = "N,N,...", value_delimiter = ',', value_parser = whole::<usize>)]
     pub joint_order: Vec<usize>,
-    /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status is 1
+    /// Correct a program's joint targets although other motions stay as they are; these are named, and the exit status
+    /// is 1
     #[arg(long)]
     pub joint_targets_only: bool,
     #[command(flatten)]
@@ -209,12 +217,14 @@ pub enum RobotWhat {
 /// `stereocal robot import`
 #[derive(Debug, Args)]
 pub struct RobotImport {
-    /// A URDF (.urdf, .xml); the kinematics file of ROS (ur_description); a table of any form, columns alpha, a, theta, d in any order; or a program's or settings' text with such parameters
+    /// A URDF (.urdf, .xml); the kinematics file of ROS (ur_description); a table of any form, columns alpha, a, theta,
+    /// d in any order; or a program's or settings' text with such parameters
     pub file: Utf8PathBuf,
     /// Link of a URDF that carries the target [default: the end of the chain]
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits --measurements, else what names and words say, else what the first and last rows show]
+    /// Where alpha and a of a table's row stand: behind the joint (classic) or before it [default: what fits
+    /// --measurements, else what names and words say, else what the first and last rows show]
     #[arg(long, value_enum)]
     pub dh: Option<DhConvention>,
     /// Measurements of the robot, which tell what a table leaves open; repeat as for `identify`
@@ -223,7 +233,8 @@ pub struct RobotImport {
     /// What a table's columns are, in their order: alpha,a,d,theta; `-` skips one
     #[arg(long, value_name = "NAME,NAME,...", allow_hyphen_values = true)]
     pub columns: Option<String>,
-    /// Units of a table's angles and lengths: deg or rad, mm, cm, m, um or in [default: what the names say, else what the numbers and words around them show]
+    /// Units of a table's angles and lengths: deg or rad, mm, cm, m, um or in [default: what the names say, else what
+    /// the numbers and words around them show]
     #[arg(long, value_name = "UNIT,UNIT", value_parser = units)]
     pub units: Option<String>,
     #[command(flatten)]
@@ -285,7 +296,8 @@ pub struct ExportRobot {
     /// Link of that URDF that is the flange [default: the end of the chain]
     #[arg(long, value_name = "LINK", requires = "nominal_urdf")]
     pub tip: Option<String>,
-    /// The nominal robot that deviations are counted from (--format ur-calibration) [default: the common arm of the same name]
+    /// The nominal robot that deviations are counted from (--format ur-calibration) [default: the common arm of the
+    /// same name]
     #[arg(long, value_name = "FILE")]
     pub nominal: Option<Utf8PathBuf>,
     #[command(flatten)]

@@ -54,8 +54,8 @@ pub struct Simulate {
     /// Stretch of both boards against their certificates, parts per million [default: 0]
     #[arg(long, value_name = "PPM", allow_negative_numbers = true, value_parser = between(-1e5, 1e5))]
     pub thermal_ppm: Option<f64>,
-    /// The true robot, instead of one drawn from the seed: a robot file, or `table-2` for what the paper identified; the
-    /// effects below are added to it
+    /// The true robot, instead of one drawn from the seed: a robot file, or `table-2` for what the paper identified;
+    /// the effects below are added to it
     #[arg(long, value_name = "FILE|table-2")]
     pub true_robot: Option<Utf8PathBuf>,
     /// Largest misalignment of parallel axes, deg [default: 0]

@@ -27,8 +27,9 @@ const OTHER_WORDS: [(&str, &str); 7] = [
 const UNITS_MM: [(&str, f64); 7] =
     [("mm", 1.0), ("cm", 10.0), ("um", 1e-3), ("inch", 25.4), ("in", 25.4), ("\"", 25.4), ("m", 1000.0)];
 
-/// The parser's message and what was likely meant. Its tips stay where they are a slip of the keys away; a word that only shares letters with the
-/// one that was typed is worse than none. `words` are those of the command line behind the program's name.
+/// The parser's message and what was likely meant. Its tips stay where they are a slip of the keys away; a word that
+/// only shares letters with the one that was typed is worse than none. `words` are those of the command line behind the
+/// program's name.
 pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap::Error, Option<String>) {
     const TIPS: [(ContextKind, ContextKind); 3] = [
         (ContextKind::SuggestedSubcommand, ContextKind::InvalidSubcommand),
@@ -55,7 +56,8 @@ pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap
     let mut built = root.clone();
     built.build();
     let command = words.iter().fold(&built, |at, word| at.find_subcommand(word).unwrap_or(at));
-    // The parser's own line leaves out what is optional, or has a flag that was typed as if it were required; and no flag is meant as a value here.
+    // The parser's own line leaves out what is optional, or has a flag that was typed as if it were required; and no
+    // flag is meant as a value here.
     if error.get(ContextKind::Usage).is_some() {
         error.insert(ContextKind::Usage, ContextValue::StyledStr(command.clone().render_usage()));
     }
@@ -104,8 +106,8 @@ fn hint(root: &Command, command: &Command, error: &clap::Error) -> Option<String
     }
 }
 
-/// For a flag that there is not: what is named without one, or the flags of another name, those that share most of its words: `--square-mm` for
-/// `--square-size`.
+/// For a flag that there is not: what is named without one, or the flags of another name, those that share most of its
+/// words: `--square-mm` for `--square-size`.
 fn named_otherwise(command: &Command, given: &str, error: &clap::Error) -> Option<String> {
     const MOST: usize = 4;
     let name = given.strip_prefix("--")?;

@@ -13,7 +13,8 @@ const USUAL: f64 = 0.1;
 /// One row in so many is outside of it, where rows are drawn otherwise.
 const MANY: usize = 10;
 
-/// That rows are where terms beyond the chain of links were not identified: links hold everywhere, what follows an angle does where it was seen.
+/// That rows are where terms beyond the chain of links were not identified: links hold everywhere, what follows an
+/// angle does where it was seen.
 pub(super) fn ranges(file: &Utf8Path, robot: &Robot, set: &Dataset, rows: &[usize]) -> Option<String> {
     if robot.corrections.is_empty() {
         return None;
@@ -50,8 +51,8 @@ pub(super) fn outside(file: &Utf8Path, robot: &Robot, set: &Dataset, rows: &[usi
     Outside { joints, rows: rows.iter().copied().filter(is_outside).collect() }
 }
 
-/// By how much a joint's reading may be outside of its range, as new ones are that are drawn like the old ones; a joint that stood still comes back to
-/// half a degree (half a mm).
+/// By how much a joint's reading may be outside of its range, as new ones are that are drawn like the old ones; a joint
+/// that stood still comes back to half a degree (half a mm).
 fn usual(joint: &Joint, (low, high): (f64, f64)) -> f64 {
     let same = if joint.slides { 0.5 } else { 0.5f64.to_radians() };
     same.max(USUAL * (high - low))
@@ -62,7 +63,8 @@ fn off(joint: &Joint, (low, high): (f64, f64), q: f64) -> Option<f64> {
     Some((low - q).max(q - high)).filter(|off| *off > usual(joint, (low, high)))
 }
 
-/// Ranges of the joints outside of which a robot was not identified, rad (mm); `None` where nothing says what these were.
+/// Ranges of the joints outside of which a robot was not identified, rad (mm); `None` where nothing says what these
+/// were.
 pub(super) fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>> {
     let widened = |(joint, (low, high)): (&Joint, (f64, f64))| {
         let usual = usual(joint, (low, high));
@@ -71,7 +73,8 @@ pub(super) fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64
     Some(robot.joints.iter().zip(known::identified_over(file, robot)?).map(widened).collect())
 }
 
-/// The joints, from 0, outside of whose ranges many of these readings, rad (mm), are, and what is said of them; a `noun` is what has readings.
+/// The joints, from 0, outside of whose ranges many of these readings, rad (mm), are, and what is said of them; a
+/// `noun` is what has readings.
 fn joints_outside(ranges: &[(f64, f64)], robot: &Robot, readings: &[&[f64]], noun: &str) -> Vec<(usize, String)> {
     let of_joint = |joint: usize| {
         let outside: Vec<f64> =
@@ -87,9 +90,10 @@ fn joints_outside(ranges: &[(f64, f64)], robot: &Robot, readings: &[&[f64]], nou
     (0..ranges.len()).filter_map(of_joint).collect()
 }
 
-/// That targets are where a robot was not identified, and whether one of its joints but the first is farther outside of its range than the range is
-/// wide. What was found over a range says of places so far beyond it what a short line says of a far point; the first joint turns the whole arm, with
-/// what its links are off by, unless terms go by its own angle.
+/// That targets are where a robot was not identified, and whether one of its joints but the first is farther outside of
+/// its range than the range is wide. What was found over a range says of places so far beyond it what a short line says
+/// of a far point; the first joint turns the whole arm, with what its links are off by, unless terms go by its own
+/// angle.
 pub(super) fn targets(file: &Utf8Path, robot: &Robot, readings: &[&[f64]]) -> Option<(String, bool)> {
     let ranges = known::identified_over(file, robot)?;
     let joints = joints_outside(&ranges, robot, readings, "target");

@@ -9,7 +9,8 @@ use crate::formats::recheck::{CheckedAgainst, Standing};
 use crate::progress;
 use crate::robot::Check;
 
-/// Warns of what a robot's or a placement's own file says of its use; with which status a command that uses it ends at best.
+/// Warns of what a robot's or a placement's own file says of its use; with which status a command that uses it ends at
+/// best.
 pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
     check.and_then(|check| check.warning(file)).into_iter().for_each(progress::warn);
     let changed = changed_since(file, "verify.json");
@@ -21,8 +22,8 @@ pub fn heed(check: Option<&Check>, file: &Utf8Path) -> Status {
 /// What speaks against a rig.
 pub struct RigDoubts {
     pub said: Vec<String>,
-    /// With which status a command ends at best that states the uncertainty of what it makes with the rig: of a rig that did not pass it states
-    /// more, of one that changed too little.
+    /// With which status a command ends at best that states the uncertainty of what it makes with the rig: of a rig
+    /// that did not pass it states more, of one that changed too little.
     pub status: Status,
     /// The same of a command that states none.
     pub status_without_uncertainty: Status,

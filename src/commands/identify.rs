@@ -79,9 +79,9 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
 
 /// What was identified, and why not all methods were run.
 ///
-/// Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the others search the
-/// same neighbourhood, for longer where there is nothing to find, and change nothing of the verdict. If the robot of that method explains rows
-/// that seemed to be unexplained, the others follow.
+/// Rows that no robot near the file's explains, as far as was seen, and rows of several robots get one method: the
+/// others search the same neighbourhood, for longer where there is nothing to find, and change nothing of the verdict.
+/// If the robot of that method explains rows that seemed to be unexplained, the others follow.
 fn search(
     set: &Dataset,
     nominal: &Robot,
@@ -104,8 +104,8 @@ fn search(
     Ok((identify(set, nominal, settings, seed, &step)?, None))
 }
 
-/// The gravest warnings on the terminal; the page and the JSON have all. What stands below, in the verdict or beside the method, is not said before it,
-/// unless that goes elsewhere.
+/// The gravest warnings on the terminal; the page and the JSON have all. What stands below, in the verdict or beside
+/// the method, is not said before it, unless that goes elsewhere.
 fn said(record: &Record, out: &OutDir, is_json: bool) {
     const MOST: usize = 5;
     for (k, warning) in record.warnings.iter().take(MOST).enumerate() {
@@ -145,7 +145,8 @@ pub fn source(files: Vec<Utf8PathBuf>, typed: &TableFlags, config: &Config) -> S
     }
 }
 
-/// Names of the tables of a run of several, by whose number its poses are named; a table that was joined of files has that number alone.
+/// Names of the tables of a run of several, by whose number its poses are named; a table that was joined of files has
+/// that number alone.
 fn files(source: &Source, rows: &[Measurement]) -> Vec<String> {
     let number = |row: &Measurement| row.at.pose.split_once(':').and_then(|(number, _)| number.parse::<usize>().ok());
     let last = rows.iter().map(number).try_fold(0, |last, number| Some(last.max(number?))).unwrap_or(0);
@@ -204,8 +205,8 @@ fn open(
     Ok((out, measured))
 }
 
-/// The `measure.json` beside the measurements, where it is about them, and whether the calibration beside them is another than the one that they
-/// were made with.
+/// The `measure.json` beside the measurements, where it is about them, and whether the calibration beside them is
+/// another than the one that they were made with.
 fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Measured {
     let folder = measurements.parent().unwrap_or(Utf8Path::new(""));
     let record = folder.join("measure.json");

@@ -126,7 +126,8 @@ fn settings(args: &Arguments) -> Settings {
     }
 }
 
-/// One program a controller, plain CSV among them. Where a language has an axis of which nobody said which joint it is, no program.
+/// One program a controller, plain CSV among them. Where a language has an axis of which nobody said which joint it is,
+/// no program.
 fn programs(args: &Arguments, robot: &Robot, order: &JointOrder, poses: &[Planned]) -> Vec<(String, String)> {
     let slides: Vec<bool> = robot.joints.iter().map(|j| j.slides).collect();
     let motion = Motion { speed_percent: args.speed_percent, dwell_s: args.dwell_s };

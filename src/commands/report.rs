@@ -44,7 +44,8 @@ fn changed(folder: &Utf8Path) -> Vec<String> {
     rig.into_iter().chain(changed_since(&folder.join("identified.toml"), "verify.json")).collect()
 }
 
-/// Where a result was made of other files than those that stand in the folder now, as far as the results say what they were made of.
+/// Where a result was made of other files than those that stand in the folder now, as far as the results say what they
+/// were made of.
 fn breaks(folder: &Utf8Path) -> Vec<String> {
     type Files = fn(Provenance) -> Vec<Digested>;
     let files = |result: &str, of: Files| Provenance::of_json(&folder.join(result)).map(of).unwrap_or_default();

@@ -156,8 +156,8 @@ fn by_readings(args: &RobotImport, name: &str, ways: &[Way]) -> Result<Robot> {
 /// The joints, rad, and the measured points of one placement.
 type Placement = (Vec<Vec<f64>>, Vec<Point3<f64>>);
 
-/// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved for, mm; `None` where it does
-/// not fit them.
+/// What a robot leaves of the measured points of the placement that has most of them, its tool and the sensor solved
+/// for, mm; `None` where it does not fit them.
 fn left_mm(robot: &Robot, rows: &[Measurement]) -> Option<f64> {
     let mut groups: std::collections::BTreeMap<&str, Placement> = std::collections::BTreeMap::new();
     for row in rows.iter().filter(|row| row.target == rows[0].target) {

@@ -1,10 +1,11 @@
 //! What to tell the robot so that it goes where it was meant to go.
 //!
-//! In: the nominal robot, for which targets were written, the identified one, and targets: readings or poses of the tool. Out: readings
-//! that bring the real tool there, or why there are none. Method: numeric inverse kinematics on the identified model with all of its
-//! terms, started from the given readings, so that the posture is kept. A target that is out of reach, needs a joint beyond its limits or
-//! lies at a singular posture (where the small correction is a large turn) is refused and nothing about it changes. An arm of fewer than six joints
-//! cannot undo a tilt of its tool: the tool's place is corrected, and the orientation as far as the arm turns that way.
+//! In: the nominal robot, for which targets were written, the identified one, and targets: readings or poses of the
+//! tool. Out: readings that bring the real tool there, or why there are none. Method: numeric inverse kinematics on the
+//! identified model with all of its terms, started from the given readings, so that the posture is kept. A target that
+//! is out of reach, needs a joint beyond its limits or lies at a singular posture (where the small correction is a
+//! large turn) is refused and nothing about it changes. An arm of fewer than six joints cannot undo a tilt of its tool:
+//! the tool's place is corrected, and the orientation as far as the arm turns that way.
 
 mod refusal;
 
@@ -17,13 +18,15 @@ use crate::robot::{Joint, Robot, inverse};
 
 pub use refusal::Refusal;
 
-/// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular one.
+/// Largest turn of a joint that is still a correction, rad: more of it is another posture, or the side of a singular
+/// one.
 const MOST_TURN_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
 /// Joints by which a tool is turned every way.
 const ALL_WAYS: usize = 6;
 
-/// What an arm of fewer joints may leave of an orientation, rad: more than robots are built off, and a target that is not one of this arm.
+/// What an arm of fewer joints may leave of an orientation, rad: more than robots are built off, and a target that is
+/// not one of this arm.
 const MOST_TILT_RAD: f64 = 0.05;
 
 /// How far a joint turns of which no file has the limits, rad: two turns, as the wrists of arms that turn farthest do.
@@ -83,8 +86,8 @@ pub struct Compensator {
 }
 
 impl Compensator {
-    /// Both have the same joints; a tool (mm, last frame) replaces those of their files. The identified robot's limits count, or the
-    /// nominal one's where it has none.
+    /// Both have the same joints; a tool (mm, last frame) replaces those of their files. The identified robot's limits
+    /// count, or the nominal one's where it has none.
     pub fn new(nominal: &Robot, identified: &Robot, tool_mm: Option<Vector3<f64>>) -> Compensator {
         let (nominal, mut identified) = (nominal.clone(), identified.clone());
         let tool = |robot: &Robot| Transform::from(tool_mm.unwrap_or(robot.tool_mm));
@@ -99,8 +102,8 @@ impl Compensator {
         Compensator { nominal, identified, unlimited, known: None, nominal_tool, identified_tool, reach_mm }
     }
 
-    /// The same that takes, for poses without readings, postures within these ranges, rad (mm), where there are any: those that the robot was
-    /// identified in.
+    /// The same that takes, for poses without readings, postures within these ranges, rad (mm), where there are any:
+    /// those that the robot was identified in.
     #[must_use]
     pub fn identified_over(mut self, ranges: &[(f64, f64)]) -> Compensator {
         let both = |(joint, &(low, high)): (&Joint, &(f64, f64))| match joint.limits_rad {
@@ -133,7 +136,8 @@ impl Compensator {
         self.identified.ends.root_from_frame0.inverse() * root_from_tool * self.identified_tool.inverse()
     }
 
-    /// A posture for poses without any: the best one at the first of them that is reached, where the robot was identified if one is.
+    /// A posture for poses without any: the best one at the first of them that is reached, where the robot was
+    /// identified if one is.
     fn posture(&self, targets: &[Target]) -> Option<Vec<f64>> {
         let poses = targets.iter().filter_map(|target| match target {
             Target::Pose { root_from_tool, near_rad: None } => Some(self.base_from_flange(root_from_tool)),
@@ -232,7 +236,8 @@ impl Compensator {
         Err(self.refusal(wanted, &start, miss_mm))
     }
 
-    /// Readings where the robot was identified: those that the search reaches from the common posture, else the nearest to it.
+    /// Readings where the robot was identified: those that the search reaches from the common posture, else the nearest
+    /// to it.
     fn inside(&self, wanted: &Transform, posture: Option<&[f64]>) -> Option<Vec<f64>> {
         let (known, posture) = (self.known.as_ref()?, posture?);
         // An arm of few joints may be at its place with its tool tilted.
@@ -257,7 +262,8 @@ impl Compensator {
         limit.filter(|_| free.arrived()).unwrap_or(Refusal::OutOfReach { short_mm })
     }
 
-    /// The first joint that these readings, rad (mm), put beyond its range: its number, the reading and the range, deg (mm).
+    /// The first joint that these readings, rad (mm), put beyond its range: its number, the reading and the range, deg
+    /// (mm).
     fn beyond(&self, readings: &[f64], refusal: impl Fn(usize, f64, (f64, f64)) -> Refusal) -> Option<Refusal> {
         let mut joints = self.identified.joints.iter().zip(readings).enumerate();
         joints.find_map(|(j, (joint, &q))| {

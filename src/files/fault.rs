@@ -10,8 +10,8 @@ pub fn decimal_comma(line: &str) -> Option<String> {
     is_comma.then(|| format!("`{value}` has a comma where a point is needed: {whole}.{decimals}"))
 }
 
-/// A message of the readers of JSON and TOML in the words of the file's format, as their own name types of the source; without the place, which is said
-/// apart.
+/// A message of the readers of JSON and TOML in the words of the file's format, as their own name types of the source;
+/// without the place, which is said apart.
 pub fn plain(message: &str) -> String {
     let message = message.split(" at line ").next().unwrap_or(message);
     let prefixed = |prefix: &str| message.strip_prefix(prefix);

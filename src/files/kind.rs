@@ -1,4 +1,5 @@
-//! What a file is that was named in place of another, for messages: the program's own files by a key or a line that no other of them has.
+//! What a file is that was named in place of another, for messages: the program's own files by a key or a line that no
+//! other of them has.
 
 use serde_json::Value;
 

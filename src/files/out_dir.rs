@@ -1,8 +1,9 @@
 //! The folder that a command writes into.
 //!
-//! One run at a time writes into it (a lock that the system drops with the process). A file is written whole or not at all. A file
-//! that the run reads is never overwritten; one that stands there and is not, byte for byte, what this program wrote, only by
-//! `--force`. What was written is remembered in `.stereocal/written.sha256`, in the form of `sha256sum`.
+//! One run at a time writes into it (a lock that the system drops with the process). A file is written whole or not at
+//! all. A file that the run reads is never overwritten; one that stands there and is not, byte for byte, what this
+//! program wrote, only by `--force`. What was written is remembered in `.stereocal/written.sha256`, in the form of
+//! `sha256sum`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{File, TryLockError};
@@ -52,14 +53,16 @@ struct State {
     swept: BTreeSet<Utf8PathBuf>,
 }
 
-/// The path of an earlier command's result: in this folder where it is there, else in the one where results usually are.
+/// The path of an earlier command's result: in this folder where it is there, else in the one where results usually
+/// are.
 pub fn or_usual(folder: &Utf8Path, name: &str, usual: &Utf8Path) -> Utf8PathBuf {
     let (here, usual) = (folder.join(name), usual.join(name));
     if here.is_file() || !usual.is_file() { here } else { usual }
 }
 
 impl OutDir {
-    /// Creates the folder where needed, checks that a file can be made in it, and waits for other runs that write into it.
+    /// Creates the folder where needed, checks that a file can be made in it, and waits for other runs that write into
+    /// it.
     pub fn open(path: &Utf8Path) -> Result<OutDir> {
         if !path.is_dir() && (path.is_file() || path.extension().is_some_and(|e| RESULTS.contains(&e))) {
             let hint = "`--out DIR` names the folder; `--out .` is the one that you are in";
@@ -83,8 +86,8 @@ impl OutDir {
         path.join(OWN).is_dir()
     }
 
-    /// Remembers what the run was asked for and what it reads: those files will not be overwritten, and every JSON file says
-    /// what it was made of. An input that is not there is left to its reader to complain of.
+    /// Remembers what the run was asked for and what it reads: those files will not be overwritten, and every JSON file
+    /// says what it was made of. An input that is not there is left to its reader to complain of.
     pub fn for_run(mut self, run: &Run, inputs: &[&Utf8Path]) -> OutDir {
         self.force = run.force;
         let mut provenance = run.command.clone().map(Provenance::new);
@@ -175,7 +178,8 @@ impl OutDir {
             let mut state = self.state();
             self.sweep(&mut state, &path);
             let line = format!("{}  {}\n", digested.sha256, one_line(name));
-            // Remembered before it is renamed into place: a run that is killed between leaves no file that it does not know.
+            // Remembered before it is renamed into place: a run that is killed between leaves no file that it does not
+            // know.
             let io = |source| Error::Io { action: "write", path: path.clone(), source };
             state.log.as_mut().map_or(Ok(()), |log| log.write_all(line.as_bytes())).map_err(io)?;
             state.written.entry(one_line(name)).or_default().insert(digested.sha256.clone());

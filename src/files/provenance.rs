@@ -1,8 +1,9 @@
 //! Where a result came from: program, date, command line, and the files it was made of, with their hashes.
 //!
-//! The hashes are SHA-256, so that `sha256sum` checks them. Pictures, of which there may be gigabytes, are listed by 128 bits of XXH3, as
-//! `xxh128sum` prints them, and the list is hashed: SHA-256 of a picture takes a sixth of the time of decoding it. Everything but the
-//! date and the command line is the same for the same inputs; the date is that of `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
+//! The hashes are SHA-256, so that `sha256sum` checks them. Pictures, of which there may be gigabytes, are listed by
+//! 128 bits of XXH3, as `xxh128sum` prints them, and the list is hashed: SHA-256 of a picture takes a sixth of the time
+//! of decoding it. Everything but the date and the command line is the same for the same inputs; the date is that of
+//! `SOURCE_DATE_EPOCH` (reproducible-builds.org) where that is set.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::{Duration, SystemTime};
@@ -16,7 +17,8 @@ use xxhash_rust::xxh3::xxh3_128;
 /// The key of a JSON file that holds its provenance.
 pub const KEY: &str = "provenance";
 
-/// Extensions of pictures, in small letters; those that lose nothing first. Of a folder that is read, these files count as read.
+/// Extensions of pictures, in small letters; those that lose nothing first. Of a folder that is read, these files count
+/// as read.
 const PICTURES: [&str; 8] = ["png", "tif", "tiff", "bmp", "pgm", "pnm", "jpg", "jpeg"];
 
 /// Digits of a picture's hash that are kept: 64 bits tell any two of a million pictures apart.
@@ -69,7 +71,8 @@ impl Provenance {
         inputs.into_iter().flat_map(|input| input.picture_hashes).collect()
     }
 
-    /// What this run read that the JSON file there was made of, too, a folder where it is some of its pictures: of that it is no test.
+    /// What this run read that the JSON file there was made of, too, a folder where it is some of its pictures: of that
+    /// it is no test.
     pub fn shares(&self, file: &Utf8Path) -> Option<&str> {
         let made_of = Provenance::of_json(file)?.inputs;
         let of = |input: &Digested, read: &Digested| {
@@ -106,7 +109,8 @@ pub struct Digested {
     /// Pictures in the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pictures: Option<usize>,
-    /// The first half of what `xxh128sum` prints for each, in the order of their names: some of them are known again in another folder.
+    /// The first half of what `xxh128sum` prints for each, in the order of their names: some of them are known again in
+    /// another folder.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub picture_hashes: Vec<String>,
     /// Of a JSON file with a provenance, what its bytes would hash to without: equal for equal results of two dates.
@@ -120,7 +124,8 @@ impl Digested {
         Digested { file: name.to_owned(), sha256, content_sha256, ..Digested::default() }
     }
 
-    /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot be read.
+    /// The pictures of a folder; `known` are the hashes of those that were read. `None` where one of the others cannot
+    /// be read.
     pub fn folder(path: &Utf8Path, known: &BTreeMap<Utf8PathBuf, String>) -> Option<Digested> {
         let mut files = pictures(path);
         // Pictures that lie elsewhere below it.
@@ -155,7 +160,8 @@ impl Digested {
         Some(Digested { file: path.to_string(), sha256, content_sha256, ..Digested::default() })
     }
 
-    /// Whether something else stands where this was read; what is there no more, or lies elsewhere below a folder, says nothing.
+    /// Whether something else stands where this was read; what is there no more, or lies elsewhere below a folder, says
+    /// nothing.
     pub fn is_other_now(&self) -> bool {
         let path = Utf8Path::new(&self.file);
         let now = match self.pictures {
@@ -196,7 +202,8 @@ pub fn sha256(bytes: &[u8]) -> String {
     format!("{:x}", Sha256::digest(bytes))
 }
 
-/// XXH3 of a picture's bytes, 128 bits in hexadecimal digits: enough to tell any two pictures apart, no proof against forgery.
+/// XXH3 of a picture's bytes, 128 bits in hexadecimal digits: enough to tell any two pictures apart, no proof against
+/// forgery.
 pub fn picture_hash(bytes: &[u8]) -> String {
     format!("{:032x}", xxh3_128(bytes))
 }

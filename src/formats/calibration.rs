@@ -56,7 +56,8 @@ pub struct CalibrationFile {
     /// Whether the last pairs confirmed the rig; empty where they did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unconfirmed: Vec<String>,
-    /// How the rig had changed at the last pair since the moment for which it and its covariance are, each change in the covariance's order.
+    /// How the rig had changed at the last pair since the moment for which it and its covariance are, each change in
+    /// the covariance's order.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     changes_since: Vec<Vec<f64>>,
     /// Slides of the board by known lengths, and what they say of the scale.
@@ -237,8 +238,9 @@ impl From<&Rig> for CalibrationFile {
 }
 
 impl CalibrationFile {
-    /// The same with how corners scattered, between which depths the boards' corners were, the verdict and the volume that it was for, the
-    /// last pairs where they contradict the rig, and how it changed since the moment that it is that of.
+    /// The same with how corners scattered, between which depths the boards' corners were, the verdict and the volume
+    /// that it was for, the last pairs where they contradict the rig, and how it changed since the moment that it is
+    /// that of.
     pub fn with_check(mut self, calibration: &Calibration, judged: &Judged) -> CalibrationFile {
         let noise = &calibration.own_noise;
         let facts = &judged.facts;
@@ -318,8 +320,9 @@ impl CovarianceRecord {
 /// The own format's name in a results folder.
 pub const OWN_NAME: &str = "calibration.json";
 
-/// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder, or of the usual one, which is then
-/// said. Of a folder, the own file or else the one that another format goes by; an error where there is none, or where it could be either of two.
+/// The file that a command reads its rig from: what was named, else `calibration.json` of the results folder, or of the
+/// usual one, which is then said. Of a folder, the own file or else the one that another format goes by; an error where
+/// there is none, or where it could be either of two.
 pub fn file(named: Option<&Utf8Path>, out: &Utf8Path, usual: &Utf8Path) -> Result<Utf8PathBuf> {
     let Some(named) = named else {
         let found = files::or_usual(out, OWN_NAME, usual);
@@ -346,7 +349,8 @@ pub fn file(named: Option<&Utf8Path>, out: &Utf8Path, usual: &Utf8Path) -> Resul
     Err(files::Error::format(named, None, message, Some("name the file: `--calibration FILE`")))
 }
 
-/// Reads `calibration.json` with what it says beside the rig, or one of the formats that [`crate::formats::export`] writes.
+/// Reads `calibration.json` with what it says beside the rig, or one of the formats that [`crate::formats::export`]
+/// writes.
 pub fn read(path: &Utf8Path) -> Result<Calibrated> {
     const WHAT: &str = "calibration file";
     let hint = "`stereocal camera-check IMAGES` writes out/calibration.json; `--calibration FILE` names another";

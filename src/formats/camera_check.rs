@@ -10,7 +10,8 @@ use crate::stereo::judge::verdict::{COVERAGE, Verdict};
 
 /// The content of `camera-check.json`. Lengths held out: no pair helped to calibrate the cameras that measured it.
 pub fn content(calibration: &Calibration, judged: &Judged) -> Map<String, Value> {
-    // By how much each side of a tag is printed farther out than it is drawn, and its expanded uncertainty, where that moves corners.
+    // By how much each side of a tag is printed farther out than it is drawn, and its expanded uncertainty, where that
+    // moves corners.
     let spread = calibration.spread_mm().map(|spread| ("board_spread_mm", json!(spread)));
     let fields = judgement(calibration, judged).into_iter().chain(figures(calibration, judged)).chain(spread);
     fields.map(|(key, value)| (key.to_owned(), value)).collect()

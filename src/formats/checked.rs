@@ -1,5 +1,5 @@
-//! What a calibration must be, whichever format it comes in: numbers of possible size, rotations that are rotations, covariances
-//! that are covariances.
+//! What a calibration must be, whichever format it comes in: numbers of possible size, rotations that are rotations,
+//! covariances that are covariances.
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 

@@ -1,7 +1,8 @@
 //! Lenses that are known, from the calibrations of other days and programs.
 //!
-//! In: files with one camera or two, each with the side that it is for where only one is meant. Out: [`KnownLenses`]. A rig's file gives both
-//! lenses, or that of the side that is asked for; a file of one camera (ROS, mrcal, OpenCV's example, a Kalibr chain of one) needs the side.
+//! In: files with one camera or two, each with the side that it is for where only one is meant. Out: [`KnownLenses`]. A
+//! rig's file gives both lenses, or that of the side that is asked for; a file of one camera (ROS, mrcal, OpenCV's
+//! example, a Kalibr chain of one) needs the side.
 
 use std::str::FromStr;
 

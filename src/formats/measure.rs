@@ -127,7 +127,8 @@ fn rig_record(series: &Series, board: &Board, rig: &Rig) -> Value {
         // Of the calibration and of the target's size.
         "chi_square": series.prior_chi_square.map(|c| c[0]),
         "degrees_of_freedom": series.prior_chi_square.map(|c| c[1]),
-        // How much larger the poses' disagreement with the common rig is than chance; and at the calibration, in units of the noise here.
+        // How much larger the poses' disagreement with the common rig is than chance; and at the calibration, in units
+        // of the noise here.
         "excess": series.excess,
         "usual_excess": series.usual_excess,
         "changes": changes.iter().map(change).collect::<Vec<_>>(),
@@ -178,8 +179,8 @@ fn shape_record(shape: &Shape, board: &Board) -> Value {
     record
 }
 
-/// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`, rows in the order
-/// of `rows`, columns in that of `parameters`.
+/// `covariance` is `order by order` of `parameters`; a pose's part of it is `sensitivity * covariance * sensitivity'`,
+/// rows in the order of `rows`, columns in that of `parameters`.
 fn shared_record(shared: &Shared, poses: &[MeasuredPose]) -> Value {
     let of = |m: &MeasuredPose| {
         let mut sensitivity = rows(&m.target.as_ref().ok()?.sensitivity);
@@ -207,7 +208,8 @@ fn scatter(series: &Series) -> Option<String> {
 
 /// Poses outside of the volume that the calibration's verdict is for.
 fn outside(series: &Series, known: &Knowledge) -> Option<String> {
-    /// Share of the depth, and angle, by which a target may stand beyond the boards: what a lens does changes little over it.
+    /// Share of the depth, and angle, by which a target may stand beyond the boards: what a lens does changes little
+    /// over it.
     const BEYOND: f64 = 0.25;
     const BEYOND_DEG: f64 = 15.0;
     /// Poses that are named.

@@ -15,7 +15,8 @@ pub const HISTORY: &str = "recheck.csv";
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Standing {
-    /// No change was seen that moves a length by more than a tenth of the tolerance, and one that moves it by the tolerance would have been.
+    /// No change was seen that moves a length by more than a tenth of the tolerance, and one that moves it by the
+    /// tolerance would have been.
     StillValid,
     /// It changed, by less than the tolerance.
     ChangedWithin,
@@ -28,7 +29,8 @@ pub enum Standing {
 }
 
 impl Standing {
-    /// Of a comparison: whether anything changed, by how much that moves a length or the target, and what would have been seen, mm.
+    /// Of a comparison: whether anything changed, by how much that moves a length or the target, and what would have
+    /// been seen, mm.
     pub fn of(changed: bool, effect_mm: f64, seen_mm: f64, tolerance_mm: f64) -> Standing {
         let harmless = !changed || effect_mm <= MATERIAL_SHARE * tolerance_mm;
         match (harmless, seen_mm <= tolerance_mm) {
@@ -54,8 +56,8 @@ impl Standing {
         if contradicted && self == Standing::StillValid { Standing::Undecided } else { self }
     }
 
-    /// What pairs say that contradict the calibration by themselves, and what they are off by, mm, where this standing is because of them or would hide
-    /// them.
+    /// What pairs say that contradict the calibration by themselves, and what they are off by, mm, where this standing
+    /// is because of them or would hide them.
     pub fn contradicted(self, recheck: &Recheck) -> Option<(String, f64)> {
         match self {
             Standing::Undecided | Standing::OwnData => recheck.contradiction(),
@@ -102,7 +104,8 @@ pub fn content(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolera
         "cause": recheck.cause(),
         "statement": statement,
         "effect_mm": effect_mm,
-        // The largest change of a length that a single cause could make without being seen in nineteen of twenty checks.
+        // The largest change of a length that a single cause could make without being seen in nineteen of twenty
+        // checks.
         "seen_mm": recheck.seen_mm,
         "causes": recheck.causes,
     })
@@ -121,7 +124,8 @@ pub struct Check {
     pub standing: Standing,
     /// The cause; empty where nothing changed.
     pub cause: String,
-    /// By how much the change moves a length, or the target of a robot, or the pairs that contradict the calibration are off, mm.
+    /// By how much the change moves a length, or the target of a robot, or the pairs that contradict the calibration
+    /// are off, mm.
     pub effect_mm: f64,
     /// What would have been seen, mm.
     pub seen_mm: f64,

@@ -35,9 +35,11 @@ pub fn content(recheck: &Recheck, standing: Standing, against: &Utf8Path, tolera
         ("statement", json!(recheck.statement())),
         // By how much the change moves the target.
         ("effect_mm", json!(recheck.effect_mm)),
-        // The largest movement of the target that a single cause could make without being seen in nineteen of twenty checks.
+        // The largest movement of the target that a single cause could make without being seen in nineteen of twenty
+        // checks.
         ("seen_mm", json!(recheck.seen_mm)),
-        // The largest that these poses leave room for, with a chance of nineteen in twenty, at them and wherever the robot was identified.
+        // The largest that these poses leave room for, with a chance of nineteen in twenty, at them and wherever the
+        // robot was identified.
         ("at_most_mm", json!(recheck.at_most_mm)),
         ("elsewhere_mm", json!(recheck.elsewhere_mm)),
         ("causes", json!(recheck.causes)),
@@ -72,7 +74,8 @@ mod tests {
         }
     }
 
-    /// Poses near to each other rule out a change at them, and none elsewhere; readings that scatter more rule out little and prove no change.
+    /// Poses near to each other rule out a change at them, and none elsewhere; readings that scatter more rule out
+    /// little and prove no change.
     #[test]
     fn a_robot_is_valid_where_it_was_identified_and_scatter_is_no_change() {
         let standing = |recheck: &Recheck| standing(recheck, 0.05, false);

@@ -1,7 +1,7 @@
 //! Targets of `compensate` as CSV: `name` and readings, or poses of the tool.
 //!
-//! Readings are `j1_deg..jN_deg` (`jN_mm` where a joint slides); poses `x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad`, with readings beside them
-//! that say the posture where they are not empty.
+//! Readings are `j1_deg..jN_deg` (`jN_mm` where a joint slides); poses `x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad`, with
+//! readings beside them that say the posture where they are not empty.
 
 use std::fmt::Write as _;
 

@@ -1,7 +1,9 @@
-//! The guide for the practitioner: how to make boards, mount cameras, take pictures and choose poses, and what the program reaches.
+//! The guide for the practitioner: how to make boards, mount cameras, take pictures and choose poses, and what the
+//! program reaches.
 //!
-//! `stereocal guide TOPIC` prints a page without a network, `stereocal guide --html DIR` makes one HTML file of all. The commands in
-//! `sh` blocks are run by a test, with the files that stand in `csv NAME` blocks; the pictures of boards are rendered and read by another.
+//! `stereocal guide TOPIC` prints a page without a network, `stereocal guide --html DIR` makes one HTML file of all.
+//! The commands in `sh` blocks are run by a test, with the files that stand in `csv NAME` blocks; the pictures of
+//! boards are rendered and read by another.
 
 /// A page of the guide.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -88,8 +90,8 @@ impl Page {
         self.text.lines().next().unwrap_or_default().trim_start_matches(['#', ' '])
     }
 
-    /// The page as a terminal shows it: what a picture shows in words in place of the picture, and the rows of a wide table as lists of their
-    /// cells.
+    /// The page as a terminal shows it: what a picture shows in words in place of the picture, and the rows of a wide
+    /// table as lists of their cells.
     pub fn plain(&self) -> String {
         let mut plain = String::with_capacity(self.text.len());
         let mut rest = self.text;
@@ -109,7 +111,8 @@ impl Page {
 /// Columns of a terminal that a line of the pages keeps to.
 const COLUMNS: usize = 100;
 
-/// The text with each row of a table that is wider than a terminal as a list: its first cell, then each other one below the name of its column.
+/// The text with each row of a table that is wider than a terminal as a list: its first cell, then each other one below
+/// the name of its column.
 fn with_narrow_tables(text: &str) -> String {
     let mut narrow = String::with_capacity(text.len());
     let mut lines = text.split_inclusive('\n').peekable();

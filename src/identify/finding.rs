@@ -9,7 +9,8 @@ pub struct Finding {
     pub rows: Vec<String>,
     /// What was done: mended, left out, or nothing but this warning, and how to have it otherwise.
     pub action: String,
-    /// Whether it is about how joints are counted, so that readings for this robot mean something else than the robot file says.
+    /// Whether it is about how joints are counted, so that readings for this robot mean something else than the robot
+    /// file says.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub of_joints: bool,
 }

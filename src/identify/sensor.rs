@@ -1,7 +1,8 @@
-//! How much a residual counts: the measurement's own covariance, the robot's scatter beyond it, and errors that poses share.
+//! How much a residual counts: the measurement's own covariance, the robot's scatter beyond it, and errors that poses
+//! share.
 //!
-//! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the calibration of a
-//! rig, its scale, the zero of a wire. The fit finds them beside the robot.
+//! A measured number is `value + own noise + extra' e`, where the extra unknowns `e` are common to many poses: the
+//! calibration of a rig, its scale, the zero of a wire. The fit finds them beside the robot.
 
 use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 
@@ -10,9 +11,9 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, RowDVector, Vector3};
 pub enum Extra {
     /// Reading of a distance when the target is at the centre, mm.
     Zero,
-    /// What else wrongly calibrated cameras do to space, which they see through a projective map (Hartley and Zisserman, "Multiple view
-    /// geometry", section 10.2): thousandths of stretch along z and y (0, 1), of shear in xy, xz, yz (2 to 4), and of scale a metre
-    /// along x, y, z (5 to 7).
+    /// What else wrongly calibrated cameras do to space, which they see through a projective map (Hartley and
+    /// Zisserman, "Multiple view geometry", section 10.2): thousandths of stretch along z and y (0, 1), of shear in xy,
+    /// xz, yz (2 to 4), and of scale a metre along x, y, z (5 to 7).
     Warp(usize),
     /// Turn of the target on the flange about x, y or z (0, 1, 2), mrad.
     Target(usize),
@@ -25,8 +26,8 @@ pub const WARPS: [&str; 8] =
     ["stretch_z", "stretch_y", "shear_xy", "shear_xz", "shear_yz", "perspective_x", "perspective_y", "perspective_z"];
 
 impl Extra {
-    /// What the residual (predicted minus measured) of a point that was measured there gains with this unknown, mm; `shared` are the
-    /// columns of its shared errors.
+    /// What the residual (predicted minus measured) of a point that was measured there gains with this unknown, mm;
+    /// `shared` are the columns of its shared errors.
     pub fn of_point(self, point_mm: &Point3<f64>, shared: Option<&Matrix3xX<f64>>) -> Vector3<f64> {
         let p = point_mm.coords;
         let moved = match self {
@@ -53,7 +54,8 @@ impl Extra {
     }
 }
 
-/// Logarithm of the evidence that an unknown of the sensor, or another reading of its covariances, must bring: one in four hundred.
+/// Logarithm of the evidence that an unknown of the sensor, or another reading of its covariances, must bring: one in
+/// four hundred.
 pub const EVIDENCE: f64 = 6.0;
 
 /// A robot's repeatability where nothing says more of it, mm: that of a common arm's data sheet.
@@ -136,10 +138,11 @@ pub struct Scatter {
     pub rotation_rad: f64,
     /// What the stated covariances are multiplied by: one, where the residuals do not clearly say otherwise.
     pub stated: f64,
-    /// Variance of a coordinate by which the robot may be expected to scatter beyond that, where the readings' own noise hides it, mm^2: it is
-    /// in no weight, but in what is promised of fresh poses.
+    /// Variance of a coordinate by which the robot may be expected to scatter beyond that, where the readings' own
+    /// noise hides it, mm^2: it is in no weight, but in what is promised of fresh poses.
     pub hidden_mm2: f64,
-    /// Standard deviation to which the residuals tell the variance of a fresh pose, mm^2, and degrees of freedom by which they tell that of a reading.
+    /// Standard deviation to which the residuals tell the variance of a fresh pose, mm^2, and degrees of freedom by
+    /// which they tell that of a reading.
     pub fresh_sd_mm2: f64,
     pub freedom: f64,
     /// A smooth error that the points of a placement share, beside all these.
@@ -159,9 +162,10 @@ impl Scatter {
         self.point_mm * self.point_mm + self.hidden_mm2
     }
 
-    /// Degrees of freedom of errors that are to be expected of fresh poses, by their covariances, mm^2: a share of them is the poses' own scatter, the rest follows from
-    /// readings that are as large as the residuals say (Satterthwaite, 1946). What covariances state is known, and what they hide is there by its
-    /// expectation already. At the least two, of which a mean can be told.
+    /// Degrees of freedom of errors that are to be expected of fresh poses, by their covariances, mm^2: a share of them
+    /// is the poses' own scatter, the rest follows from readings that are as large as the residuals say (Satterthwaite,
+    /// 1946). What covariances state is known, and what they hide is there by its expectation already. At the least
+    /// two, of which a mean can be told.
     pub fn freedom_of(&self, errors_mm2: &[Matrix3<f64>]) -> f64 {
         let fresh_mm2 = self.fresh_mm2().max(f64::MIN_POSITIVE);
         let total_mm2 = errors_mm2.iter().map(Matrix3::trace).sum::<f64>() / errors_mm2.len().max(1) as f64;

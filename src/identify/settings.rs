@@ -1,4 +1,5 @@
-//! What can be chosen in an identification: method, model, box, swarm constants; section `[identify]` of `stereocal.toml`.
+//! What can be chosen in an identification: method, model, box, swarm constants; section `[identify]` of
+//! `stereocal.toml`.
 
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +103,8 @@ pub enum Prior {
 pub enum Constants {
     /// Those of this program: velocities limited, local search from the best particle as soon as the swarm slows down
     Shipped,
-    /// Section 3.2 of the paper to the letter: no limit of the velocity, local search from every particle once the swarm has come to rest
+    /// Section 3.2 of the paper to the letter: no limit of the velocity, local search from every particle once the
+    /// swarm has come to rest
     Paper,
 }
 
@@ -126,15 +128,18 @@ pub struct Settings {
     pub bound_deg: f64,
     /// Whether the box is doubled for a parameter until the trust region no longer ends at its wall.
     pub widen_bounds: bool,
-    /// Relative to the longest column, below which the poses don't determine a direction. 1e-4: commands rounded to a thousandth of
-    /// a degree turn a flange that should keep its orientation by about so much, and what moves the target by a
-    /// ten-thousandth as far as the strongest parameter drowns in any instrument's noise.
+    /// Relative to the longest column, below which the poses don't determine a direction. 1e-4: commands rounded to a
+    /// thousandth of a degree turn a flange that should keep its orientation by about so much, and what moves the
+    /// target by a ten-thousandth as far as the strongest parameter drowns in any instrument's noise.
     pub rank_tolerance: f64,
-    /// Regions that are held out in turn where there are fewer than three placements, and placements held out together at the least.
+    /// Regions that are held out in turn where there are fewer than three placements, and placements held out together
+    /// at the least.
     pub folds: usize,
-    /// Whether units, signs, exchanged columns and the robot's convention are examined, and mended where the residuals prove a fault.
+    /// Whether units, signs, exchanged columns and the robot's convention are examined, and mended where the residuals
+    /// prove a fault.
     pub examine: bool,
-    /// Whether the zero of measured distances is unknown: a wire's as well as its anchor, and that of distances to a centre.
+    /// Whether the zero of measured distances is unknown: a wire's as well as its anchor, and that of distances to a
+    /// centre.
     pub wire_offset: bool,
     /// Rows that fit worse than so many robust standard deviations are left out and named; 0 keeps all.
     pub outlier_sigmas: f64,
@@ -243,8 +248,8 @@ pub struct SwarmSettings {
     pub cpso_c: f64,
     /// Inertia of APSO for the best and for poor particles: 0.4 and 0.9, Shi and Eberhart (1998), spread by fitness.
     pub apso_inertia: [f64; 2],
-    /// Diversity below which ARPSO repels and above which it attracts, Riget and Vesterstrom (2002). Theirs are 5e-6 and 0.25;
-    /// 500 iterations in 19 dimensions never draw together so far, and the switch would stay where it is.
+    /// Diversity below which ARPSO repels and above which it attracts, Riget and Vesterstrom (2002). Theirs are 5e-6
+    /// and 0.25; 500 iterations in 19 dimensions never draw together so far, and the switch would stay where it is.
     pub arpso_diversity: [f64; 2],
     /// STAPSO: the constants.
     pub stapso: StapsoSettings,
@@ -297,10 +302,11 @@ impl Default for StapsoSettings {
 }
 
 impl SwarmSettings {
-    /// Section 3.2 of the paper read to the letter. M, K, the stop after 50 iterations and a are given there and are the
-    /// default's too. Eq. (14) limits no velocity, so here the box's width does; step 5 moves every particle by the trust
-    /// region, whose settings are "traditional", so it runs until it converges; S and beta are not given: nothing but the
-    /// stop's 50 iterations and 1e-4 says what little change is, and S must be less than 50 for the choice ever to be made.
+    /// Section 3.2 of the paper read to the letter. M, K, the stop after 50 iterations and a are given there and are
+    /// the default's too. Eq. (14) limits no velocity, so here the box's width does; step 5 moves every particle by the
+    /// trust region, whose settings are "traditional", so it runs until it converges; S and beta are not given: nothing
+    /// but the stop's 50 iterations and 1e-4 says what little change is, and S must be less than 50 for the choice ever
+    /// to be made.
     pub fn paper() -> SwarmSettings {
         let stapso = StapsoSettings {
             stagnation_iterations: 25,

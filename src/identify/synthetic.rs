@@ -1,4 +1,5 @@
-//! A small world for tests: the paper's robot with Table 2's errors, measured on spheres round the paper's four start points.
+//! A small world for tests: the paper's robot with Table 2's errors, measured on spheres round the paper's four start
+//! points.
 
 use nalgebra::{Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -61,7 +62,8 @@ pub fn state(rows: &mut [Measurement], covariance: impl Fn(&RobotPose) -> Option
 /// Start points of section 4.2, mm in the base frame.
 const STARTS: [[f64; 3]; 4] = [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
 
-/// `samples` poses with orientations tilted up to 25 degrees, noise a coordinate in mm; an eighth as many again to verify.
+/// `samples` poses with orientations tilted up to 25 degrees, noise a coordinate in mm; an eighth as many again to
+/// verify.
 pub fn world(samples: usize, noise_mm: f64, seed: u64) -> World {
     planned(samples, samples / 8 + 4, 25.0, noise_mm, seed, &|_| {})
 }
@@ -119,7 +121,8 @@ fn starts() -> Vec<Vec<f64>> {
     (0..8).map(|k| vec![0.785 * k as f64 - 3.0, 0.6, -1.2, 0.5, 1.3, 0.2]).collect()
 }
 
-/// Distances of all spheres' poses to the first sphere's centre, as one group: by the index of the row, where the robot is and where from.
+/// Distances of all spheres' poses to the first sphere's centre, as one group: by the index of the row, where the robot
+/// is and where from.
 pub fn to_first(world: &World, distance: impl Fn(usize, Point3<f64>, Point3<f64>) -> f64) -> Dataset {
     let place = |row: &Measurement| world.truth.target_mm(&row.at.joints_rad());
     let (mut rows, from) = (world.rows.clone(), place(&world.rows[0]));
@@ -132,7 +135,8 @@ pub fn to_first(world: &World, distance: impl Fn(usize, Point3<f64>, Point3<f64>
     Dataset::new(&rows).unwrap()
 }
 
-/// What a tracker reads of several targets on the flange, by their places in the last joint's frame, mm, and the noise of a coordinate.
+/// What a tracker reads of several targets on the flange, by their places in the last joint's frame, mm, and the noise
+/// of a coordinate.
 pub fn of_targets(world: &World, targets: &[(&str, Vector3<f64>)], noise_mm: f64, seed: u64) -> Vec<Measurement> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut rows = Vec::new();
@@ -188,8 +192,8 @@ pub fn normal(random: &mut Pcg64Mcg) -> Vector3<f64> {
     Vector3::new(one(), one(), one())
 }
 
-/// Eight sockets touched twelve times each with 0.03 mm of play a coordinate; the third moves by so much after half of its touches.
-/// Where they are, mm, stands beside the world.
+/// Eight sockets touched twelve times each with 0.03 mm of play a coordinate; the third moves by so much after half of
+/// its touches. Where they are, mm, stands beside the world.
 pub fn touched(moved_mm: f64, seed: u64) -> (World, Vec<Vector3<f64>>) {
     let mut world = planned(0, 0, 25.0, 0.0, seed, &|_| {});
     let mut random = Pcg64Mcg::seed_from_u64(seed);

@@ -155,7 +155,8 @@ fn any_number_of_threads_gives_the_same_bytes() {
 
 #[test]
 fn truth_is_recovered_within_the_predicted_sigmas() {
-    // Without the prior, so that sigma is the data's alone; base parameters of a truth whose other parameters are nominal.
+    // Without the prior, so that sigma is the data's alone; base parameters of a truth whose other parameters are
+    // nominal.
     let (mut inside, mut total) = (0, 0);
     for seed in 0..12 {
         let world = synthetic::planned(60, 0, 25.0, NOISE_MM, 40 + seed, &|truth| {
@@ -183,7 +184,8 @@ fn truth_is_recovered_within_the_predicted_sigmas() {
     assert!(inside * 100 >= 90 * total, "{inside} of {total}");
 }
 
-/// The world's rows as cameras read them that state covariances of 0.2 mm at a metre, and see everything larger by this factor.
+/// The world's rows as cameras read them that state covariances of 0.2 mm at a metre, and see everything larger by this
+/// factor.
 fn seen_by_cameras(world: &World, scale: f64) -> Dataset {
     let mut rows = world.rows.clone();
     let before_them = Vector3::new(0.0, 0.0, 1000.0);

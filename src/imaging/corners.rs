@@ -39,8 +39,8 @@ pub struct Corner {
     pub covariance_px2: Option<Matrix2<f64>>,
     /// Standard deviation of the blur across its edges, px, where the refinement gave one.
     pub blur_px: Option<f64>,
-    /// How far its window reaches along the edges that run along the rows and along the columns, as a share of a square's side; known
-    /// where it was measured here.
+    /// How far its window reaches along the edges that run along the rows and along the columns, as a share of a
+    /// square's side; known where it was measured here.
     pub reach: Option<[f64; 2]>,
     /// False for a corner that was found but is not to be relied on.
     pub used: bool,

@@ -59,8 +59,9 @@ pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counte
 /// In how many pictures columns and rows of squares were counted.
 type Counts = BTreeMap<(usize, usize), usize>;
 
-/// The count that the pictures agree on, which show where the board `ends`. Of a board without a margin that is seen it is what half of the pictures
-/// with a grid in full view show, and hardly any shows more: less is shown where a hand covers a line.
+/// The count that the pictures agree on, which show where the board `ends`. Of a board without a margin that is seen it
+/// is what half of the pictures with a grid in full view show, and hardly any shows more: less is shown where a hand
+/// covers a line.
 fn decided(counts: &Counts, of: usize, ends: bool) -> Option<Counted> {
     let (&(columns, rows), &pictures) = counts.iter().max_by_key(|(_, pictures)| **pictures)?;
     let contradicts = |&(c, r): &(usize, usize)| if ends { (c, r) != (columns, rows) } else { c * r > columns * rows };

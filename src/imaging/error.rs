@@ -234,8 +234,8 @@ fn as_printed(board: &Board) -> String {
     )
 }
 
-/// How a board is named of another kind than was looked for, whose markers or tags pictures show. One that has markers itself may stand among others: most
-/// pictures are to show them then.
+/// How a board is named of another kind than was looked for, whose markers or tags pictures show. One that has markers
+/// itself may stand among others: most pictures are to show them then.
 fn of_kind_seen(board: &Board, skipped: &[Skipped]) -> Option<String> {
     let [markers, tags] = [HAS_MARKERS, HAS_TAGS].map(|begins| named(skipped, begins));
     let is_tags = tags.as_ref().map(|(count, _)| *count) > markers.as_ref().map(|(count, _)| *count);

@@ -185,8 +185,8 @@ impl Folder<'_> {
     }
 }
 
-/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there are none, and the board that
-/// both pictures show instead.
+/// The board's corners in one pair, numbered alike in left and right as far as its colours tell; the reason where there
+/// are none, and the board that both pictures show instead.
 pub fn find_pair(files: &PairFiles, wanted: &Wanted<'_>) -> Result<PairCorners, Refusal> {
     let alone = |path: &Utf8Path| read_and_look(path, &image::header(path)?, wanted);
     let looks = <[Look; 2]>::from(rayon::join(|| alone(&files.left), || alone(&files.right)));
@@ -263,7 +263,8 @@ pub fn seen_in(picture: &Picture, board: Board) -> Look {
     corners_of(picture, &detected(picture, board)?, board)
 }
 
-/// The board in a picture; where markers were looked for and none was read, the plain board that it shows, if it shows a whole one.
+/// The board in a picture; where markers were looked for and none was read, the plain board that it shows, if it shows
+/// a whole one.
 fn detected(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
     let counted = |refusal: Refusal| {
         let is_unread = board.is_coded() && coded::is_unread(&refusal);
@@ -322,7 +323,8 @@ fn corners_of(picture: &Picture, detected: &Detected, board: Board) -> Look {
     Ok(Sighting { corners, print: detected.print, open: detected.open.clone() })
 }
 
-/// True where a grid is more than noise makes of nothing: most of its corners are measured, and far better than a square is long.
+/// True where a grid is more than noise makes of nothing: most of its corners are measured, and far better than a
+/// square is long.
 fn is_measured(corners: &Lattice<Corner>) -> bool {
     /// Largest standard deviation, as a share of a square's side.
     const WELL: f64 = 0.05;

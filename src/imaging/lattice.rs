@@ -23,7 +23,8 @@ impl Places {
         self.side_px(Pitch::Even)
     }
 
-    /// The median side of a square, px, by the distances of neighbours on a board whose lines follow one another like this; `None` without neighbours.
+    /// The median side of a square, px, by the distances of neighbours on a board whose lines follow one another like
+    /// this; `None` without neighbours.
     pub fn side_px(&self, pitch: Pitch) -> Option<f64> {
         median(self.sides_px(pitch))
     }
@@ -43,8 +44,9 @@ impl Places {
         self.iter().flat_map(both).flatten()
     }
 
-    /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two or three corners
-    /// before it. Steps of perspective change evenly enough from one square to the next. `None` where two are missing.
+    /// Where a line of corners goes on beyond `(col, row)` in a direction, and the step that leads there: from the two
+    /// or three corners before it. Steps of perspective change evenly enough from one square to the next. `None` where
+    /// two are missing.
     pub fn next(&self, (col, row): (isize, isize), (dc, dr): (isize, isize)) -> Option<(Point2<f64>, Vector2<f64>)> {
         let back = |k: isize| self.around(col - k * dc, row - k * dr);
         let (near, second) = (back(0)?, back(1)?);
@@ -139,7 +141,8 @@ impl<T: Clone> Lattice<T> {
     }
 }
 
-/// The place that a column and a row have after so many quarter turns, from the columns' direction to the rows', of a grid that ends at `last`.
+/// The place that a column and a row have after so many quarter turns, from the columns' direction to the rows', of a
+/// grid that ends at `last`.
 pub fn turned_place((col, row): (isize, isize), last: (isize, isize), quarters: usize) -> (isize, isize) {
     match quarters % 4 {
         0 => (col, row),
@@ -149,7 +152,8 @@ pub fn turned_place((col, row): (isize, isize), last: (isize, isize), quarters: 
     }
 }
 
-/// Another numbering of the same corners: turned about corner (0, 0) by so many quarter turns, then moved by columns and rows.
+/// Another numbering of the same corners: turned about corner (0, 0) by so many quarter turns, then moved by columns
+/// and rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Renumbering {
     /// Quarter turns, from the columns' direction to the rows'.
@@ -180,7 +184,8 @@ impl Renumbering {
 }
 
 impl<T: Clone> Lattice<T> {
-    /// The same corners with other numbers, in a lattice of this many columns and rows; `None` where one would lie outside of it.
+    /// The same corners with other numbers, in a lattice of this many columns and rows; `None` where one would lie
+    /// outside of it.
     pub fn renumbered(&self, numbering: &Renumbering, (columns, rows): (usize, usize)) -> Option<Lattice<T>> {
         let mut lattice = Lattice { columns, rows, cells: vec![None; columns * rows] };
         for (col, row, value) in self.iter() {

@@ -1,10 +1,10 @@
 //! One order of corners for both cameras and all pairs.
 //!
-//! In: grids of corners, right-handed and turned as far as the colours tell. Out: the same grids, turned so that left and
-//! right number the same corner alike. Where a board looks the same after a half turn (a square one with an odd
-//! number of squares: after a quarter turn), each picture alone leaves 2 (or 4) numberings. Pictures of one camera then get the
-//! numbering nearest to their common direction, and right pictures the one nearest to the direction that most of them
-//! have relative to their left pictures: cameras of a rig keep their roll against each other.
+//! In: grids of corners, right-handed and turned as far as the colours tell. Out: the same grids, turned so that left
+//! and right number the same corner alike. Where a board looks the same after a half turn (a square one with an odd
+//! number of squares: after a quarter turn), each picture alone leaves 2 (or 4) numberings. Pictures of one camera then
+//! get the numbering nearest to their common direction, and right pictures the one nearest to the direction that most
+//! of them have relative to their left pictures: cameras of a rig keep their roll against each other.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

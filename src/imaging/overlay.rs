@@ -1,7 +1,8 @@
-//! What was found, drawn over the pictures: left and right of a pair side by side, reduced to about a megapixel each, or to thumbnails.
+//! What was found, drawn over the pictures: left and right of a pair side by side, reduced to about a megapixel each,
+//! or to thumbnails.
 //!
-//! A ring at each corner, coloured by how well it is known; a line from corner (0, 0) along the columns and a shorter one
-//! along the rows shows the order both pictures were read in.
+//! A ring at each corner, coloured by how well it is known; a line from corner (0, 0) along the columns and a shorter
+//! one along the rows shows the order both pictures were read in.
 
 use camino::Utf8Path;
 use image::{GrayImage, Rgb, RgbImage, imageops};

@@ -23,8 +23,9 @@ pub fn printed(board: &Board, seen: &[[Look; 2]]) -> Option<String> {
     (!prints.is_empty() && !said.is_empty()).then(|| format!("the board's markers: {}", said.join(", ")))
 }
 
-/// The sides of a board with markers whose outermost squares or tags no picture shows: the board may have fewer than its name says, and then its middle is
-/// elsewhere. Markers count from one side, so that those that are there do not tell.
+/// The sides of a board with markers whose outermost squares or tags no picture shows: the board may have fewer than
+/// its name says, and then its middle is elsewhere. Markers count from one side, so that those that are there do not
+/// tell.
 pub fn unseen_lines(board: &Board, pairs: &[PairCorners]) -> Option<String> {
     if !board.is_coded() {
         return None;
@@ -64,7 +65,8 @@ pub fn unseen_lines(board: &Board, pairs: &[PairCorners]) -> Option<String> {
     })
 }
 
-/// The tags of a grid of separate ones that no picture shows where it shows those beside them: others are in their place, or something hides them.
+/// The tags of a grid of separate ones that no picture shows where it shows those beside them: others are in their
+/// place, or something hides them.
 pub fn missing_tags(board: &Board, pairs: &[PairCorners]) -> Option<String> {
     /// Pictures of those beside them that tell it, and so many beside them.
     const FEWEST: usize = 3;

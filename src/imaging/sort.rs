@@ -1,9 +1,10 @@
-//! What was found in a folder's pictures, sorted by pairs: those of use, those that are not and why, those whose numbers stay open.
+//! What was found in a folder's pictures, sorted by pairs: those of use, those that are not and why, those whose
+//! numbers stay open.
 //!
-//! In: what each picture shows. Out: pairs whose corners are numbered alike in left and right. Numbers stay open of a plain board that is cut or
-//! hidden, where it is not seen how many lines are missing on which side: such a pair comes with all numberings that its corners may have. How the
-//! cameras stand, which other pairs tell, decides between them later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done
-//! counts as one without a board.
+//! In: what each picture shows. Out: pairs whose corners are numbered alike in left and right. Numbers stay open of a
+//! plain board that is cut or hidden, where it is not seen how many lines are missing on which side: such a pair comes
+//! with all numberings that its corners may have. How the cameras stand, which other pairs tell, decides between them
+//! later (`crate::stereo::pairs::open_numbers`); a pair for which that is not done counts as one without a board.
 
 use super::board::{Board, Layout, Squares};
 use super::coded::measures;
@@ -26,8 +27,9 @@ pub fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     };
     let refused: Vec<Refusal> = seen.iter().flatten().filter_map(refusal).collect();
     let boards: Vec<Board> = refused.iter().filter_map(|refusal| refusal.seen).collect();
-    // Where the markers of one picture are of a small dictionary and those of another of a larger one that begins with it, it is the larger.
-    // A picture that shows a part of a board with markers tells the columns, and rows no farther than it goes.
+    // Where the markers of one picture are of a small dictionary and those of another of a larger one that begins with
+    // it, it is the larger. A picture that shows a part of a board with markers tells the columns, and rows no farther
+    // than it goes.
     let is_part = |board: &Board, part: &Board| {
         let cut = Board { squares: Squares { rows: part.squares.rows, ..board.squares }, ..*board };
         board.is_coded() && cut.has_all_of(part)
@@ -38,7 +40,8 @@ pub fn other_board(seen: &[[Look; 2]]) -> Option<Board> {
     (2 * shown(board) > refused.len()).then_some(*board)
 }
 
-/// Refusals for another size of the markers or gaps with the size that all of these pictures show together: each measures it a little differently.
+/// Refusals for another size of the markers or gaps with the size that all of these pictures show together: each
+/// measures it a little differently.
 pub fn with_common_sizes(mut seen: Vec<[Look; 2]>, board: &Board) -> Vec<[Look; 2]> {
     let size_mm = |look: &Look| measures::other_size_mm(board, &look.as_ref().err()?.seen?);
     let Some(middle_mm) = median(seen.iter().flatten().filter_map(size_mm)) else { return seen };

@@ -15,8 +15,8 @@ use crate::robot::Robot;
 use crate::tables::names::{Name, What, words};
 use crate::tables::{Fields, Form};
 
-/// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the readings side by side. Says
-/// whether there were any.
+/// Makes files with a multiple of the others' rows, so many readings a pose, as long as these: one row a pose, the
+/// readings side by side. Says whether there were any.
 pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     let Some(least) = parts.iter().map(|p| p.rows.len()).min() else { return Ok(false) };
     let widened = parts.iter().any(|p| p.rows.len() != least);
@@ -50,7 +50,8 @@ pub(super) fn widen(parts: &mut [Part]) -> Result<bool> {
     Ok(widened)
 }
 
-/// How many rows farther the next pose stands, and the next reading of a pose: one after the other, or first all of the first target.
+/// How many rows farther the next pose stands, and the next reading of a pose: one after the other, or first all of the
+/// first target.
 fn strides(part: &Part, poses: usize, times: usize) -> Option<(usize, usize)> {
     let columns = coordinates(part)?.map(|column| At { part: 0, column });
     let point = |row: usize| point(std::slice::from_ref(part), row, &columns);
@@ -268,7 +269,8 @@ impl Taken<'_> {
         words.iter().map(|word| format!(", {word}")).collect()
     }
 
-    /// Columns of numbers, and of words that part the rows, that were left alone, but for those of `measure` that say how a row came about.
+    /// Columns of numbers, and of words that part the rows, that were left alone, but for those of `measure` that say
+    /// how a row came about.
     fn unused(&self) -> String {
         const NAMED: usize = 12;
         let of_measure =
@@ -316,7 +318,8 @@ fn turns(file: &Part, column: usize) -> bool {
     is_entry || name.is_some_and(|name| words(name).0.iter().any(|word| TURNS.contains(&word.as_str())))
 }
 
-/// Whether a column has a few words, each in several rows, as places and sessions have: it may be the group that the user means.
+/// Whether a column has a few words, each in several rows, as places and sessions have: it may be the group that the
+/// user means.
 fn parts_rows(file: &Part, column: usize) -> bool {
     let mut words: Vec<&str> = file.rows.iter().map(|(_, row)| row[column].trim()).collect();
     words.sort_unstable();

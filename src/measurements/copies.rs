@@ -1,15 +1,16 @@
-//! Rows that are copies of others to the last digit: an instrument hardly ever reads a point twice alike, so copies say nothing of how well a robot
-//! repeats.
+//! Rows that are copies of others to the last digit: an instrument hardly ever reads a point twice alike, so copies say
+//! nothing of how well a robot repeats.
 //!
-//! In: rows. Out: the rows without the copies, and a sentence that names them; rows to verify that are copies of rows to fit are kept without their
-//! reading. What goes wrong: readings that are rounded to hundredths of a millimetre or more, and some among others at the same joints that
-//! differ, may be alike without being copies; these are kept.
+//! In: rows. Out: the rows without the copies, and a sentence that names them; rows to verify that are copies of rows
+//! to fit are kept without their reading. What goes wrong: readings that are rounded to hundredths of a millimetre or
+//! more, and some among others at the same joints that differ, may be alike without being copies; these are kept.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{Measurement, Observed, Role};
 
-/// Rounded to this, mm, or more coarsely, two readings of one point may be alike: instruments and robots repeat to no less.
+/// Rounded to this, mm, or more coarsely, two readings of one point may be alike: instruments and robots repeat to no
+/// less.
 const ROUNDED_MM: f64 = 0.01;
 
 /// A multiple of a step is off by this share of it at the most, from rounding.
@@ -112,7 +113,8 @@ mod tests {
         Observed::Distance { distance_mm: 500.25 + 3.0 * k as f64 + off_mm, sigma_mm: None }
     }
 
-    /// How many of ten verify rows are without a reading, of which so many copy a fitted row and others came back to one.
+    /// How many of ten verify rows are without a reading, of which so many copy a fitted row and others came back to
+    /// one.
     fn left_out(read: impl Fn(usize, f64) -> Observed, copies: usize, again: usize) -> usize {
         let mut rows: Vec<Measurement> = (0..12).map(|k| row(k, Role::Sample, read(k, 0.0))).collect();
         let verify = |k: usize| match k {

@@ -1,8 +1,9 @@
 //! Rows that a result was made of, known again in another file.
 //!
-//! In: rows. Out: a word for each, of its joints and its reading to a thousandth of a degree and a mm: a file that was cut, sorted, renamed or
-//! written with fewer decimals has the same, and a pose that was measured anew has another for the scatter of the reading. Goes wrong: a number
-//! that lies half-way between two thousandths and is written anew may change its word.
+//! In: rows. Out: a word for each, of its joints and its reading to a thousandth of a degree and a mm: a file that was
+//! cut, sorted, renamed or written with fewer decimals has the same, and a pose that was measured anew has another for
+//! the scatter of the reading. Goes wrong: a number that lies half-way between two thousandths and is written anew may
+//! change its word.
 
 use std::collections::BTreeSet;
 
@@ -32,7 +33,8 @@ impl Given {
         Given { fitted: words(false), verify: words(true) }
     }
 
-    /// The same with rows as they were mended, by which a file is known that was mended since: role, joints (deg, or mm), and point (mm).
+    /// The same with rows as they were mended, by which a file is known that was mended since: role, joints (deg, or
+    /// mm), and point (mm).
     pub fn with_mended(mut self, rows: impl IntoIterator<Item = (Role, Vec<f64>, [f64; 3])>) -> Given {
         for (role, joints_deg, point_mm) in rows {
             let list = if role == Role::Verify { &mut self.verify } else { &mut self.fitted };

@@ -1,9 +1,10 @@
 //! Rows of files that complete each other, joined by the names that both files give them.
 //!
-//! In: the files of one table. Out: the same with their rows in the order of one of them, and a sentence where that is another than they stand in.
-//! A row's name is its `pose`, what a program calls its target, its number, or a label that ends in its number. Names that stand in the same order
-//! need nothing. Rows whose name the other file does not have are left out and said. A file of points may have more rows of one name than of another:
-//! each takes the joints of its name. What goes wrong: names of which the other file has less than half, which are said, and the rows paired as they
+//! In: the files of one table. Out: the same with their rows in the order of one of them, and a sentence where that is
+//! another than they stand in. A row's name is its `pose`, what a program calls its target, its number, or a label that
+//! ends in its number. Names that stand in the same order need nothing. Rows whose name the other file does not have
+//! are left out and said. A file of points may have more rows of one name than of another: each takes the joints of its
+//! name. What goes wrong: names of which the other file has less than half, which are said, and the rows paired as they
 //! stand; and a name that has more rows of joints than others, or one of three files and more, which is refused.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,8 +1,9 @@
 //! Readings that were repeated under the name of one pose: their names are told apart.
 //!
-//! In: a table of measurements. Out: the same; rows of one name, and of one target where a column tells it, are called `1.1`, `1.2` where they have
-//! the same joints, group and role and are of one point, or one distance. What goes wrong: rows of one name that are not, such as several targets
-//! that no column tells apart, keep it and are refused where they are read.
+//! In: a table of measurements. Out: the same; rows of one name, and of one target where a column tells it, are called
+//! `1.1`, `1.2` where they have the same joints, group and role and are of one point, or one distance. What goes wrong:
+//! rows of one name that are not, such as several targets that no column tells apart, keep it and are refused where
+//! they are read.
 
 use std::collections::BTreeMap;
 

@@ -211,10 +211,10 @@ pub fn read_poses(path: &Utf8Path) -> Result<Vec<RobotPose>> {
     table.poses(None)
 }
 
-/// Reads `measurements.csv`, or any table with `j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`; `pose` is the row's number, `group` one and
-/// `role` sample where they are absent.
-/// A row whose `status` is not `ok`, or whose numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of
-/// its targets. Readings repeated under one name have it with their number behind it.
+/// Reads `measurements.csv`, or any table with `j1_deg..` and either `x_mm,y_mm,z_mm` or `distance_mm`; `pose` is the
+/// row's number, `group` one and `role` sample where they are absent. A row whose `status` is not `ok`, or whose
+/// numbers are all empty, is [`Observed::Missing`]. With a column `target` a pose has a row for each of its targets.
+/// Readings repeated under one name have it with their number behind it.
 pub fn read(path: &Utf8Path) -> Result<Vec<Measurement>> {
     read_whole(path).map(|(rows, _)| rows)
 }
@@ -282,7 +282,8 @@ pub(super) fn from_table(mut table: Table) -> Result<Vec<Measurement>> {
     Ok(rows)
 }
 
-/// No eigenvalue is negative beyond what rounding the entries to five digits leaves; zeros are an instrument's resolution.
+/// No eigenvalue is negative beyond what rounding the entries to five digits leaves; zeros are an instrument's
+/// resolution.
 fn is_covariance(matrix: &Matrix3<f64>) -> bool {
     let eigen = matrix.symmetric_eigenvalues();
     eigen.min() >= -1e-4 * eigen.max() && eigen.max() >= 0.0

@@ -1,9 +1,10 @@
 //! Measurements from files as people have them.
 //!
-//! In: one or several files, perhaps names of their columns and units, and the nominal robot. Out: rows of measurements, and a line for each table
-//! that says what was taken. A table in the contract's own columns is read as it stands. Of others the names say which columns are which, where
-//! there are names, and the nominal robot decides what they leave open; what stays open is refused with the flags that settle it.
-//! Files that lack joints or points are joined row by row, complete ones are stacked.
+//! In: one or several files, perhaps names of their columns and units, and the nominal robot. Out: rows of
+//! measurements, and a line for each table that says what was taken. A table in the contract's own columns is read as
+//! it stands. Of others the names say which columns are which, where there are names, and the nominal robot decides
+//! what they leave open; what stays open is refused with the flags that settle it. Files that lack joints or points are
+//! joined row by row, complete ones are stacked.
 
 use camino::Utf8PathBuf;
 use serde::Deserialize;
@@ -128,7 +129,8 @@ impl Source {
         Ok(checked(rows, said, robot))
     }
 
-    /// The readings of the first file alone, whatever else stands beside them: line, name and readings in deg (mm); and what was taken.
+    /// The readings of the first file alone, whatever else stands beside them: line, name and readings in deg (mm); and
+    /// what was taken.
     #[allow(clippy::type_complexity, reason = "one use")]
     pub fn readings(&self, robot: &Robot) -> Result<(Vec<(u64, String, Vec<f64>)>, String)> {
         let count = robot.joints.len();

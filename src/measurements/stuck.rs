@@ -1,8 +1,9 @@
 //! Readings that do not follow the robot: one point to the last digit at places that are far apart.
 //!
-//! An instrument that lost its target, or a program that writes zeros where nothing was read, gives the same point again and again. In: rows, and
-//! the nominal robot. Out: the same rows, those readings taken away, and why. What goes wrong: the first of such readings may be a true one,
-//! after which the instrument stood still; it goes with the others. A single failed reading is left to the fit, which finds it far off.
+//! An instrument that lost its target, or a program that writes zeros where nothing was read, gives the same point
+//! again and again. In: rows, and the nominal robot. Out: the same rows, those readings taken away, and why. What goes
+//! wrong: the first of such readings may be a true one, after which the instrument stood still; it goes with the
+//! others. A single failed reading is left to the fit, which finds it far off.
 
 use std::collections::BTreeMap;
 
@@ -37,7 +38,8 @@ pub(super) fn taken_away(mut rows: Vec<Measurement>, robot: &Robot) -> Vec<Measu
         of.len() >= least && places(of.iter().map(|&i| &rows[i]), robot, least) >= least
     });
     let stuck: usize = of_point.values().map(Vec::len).sum();
-    // Points that were touched again and again in other postures, and are known from elsewhere, are most of their table.
+    // Points that were touched again and again in other postures, and are known from elsewhere, are most of their
+    // table.
     if points - stuck < OWN || of_point.len() > 1 && 2 * stuck > points {
         return rows;
     }
@@ -132,7 +134,8 @@ mod tests {
 
     #[test]
     fn points_that_were_read_again_are_readings() {
-        // At one place; at the last joint's own axis; and known points that were touched in other postures, with another tool than the file's.
+        // At one place; at the last joint's own axis; and known points that were touched in other postures, with
+        // another tool than the file's.
         let mut again = rows(40);
         for k in 1..6 {
             (again[k].at.joints_deg, again[k].observed) = (again[0].at.joints_deg.clone(), again[0].observed.clone());

@@ -1,8 +1,10 @@
 //! Rows of figures that stand below a table and are no measurements: means, deviations, extremes, sums.
 //!
-//! In: the rows of a table. Out: the rows without those, and a sentence that says which they were. A row's numbers tell, in whatever language it is
-//! called: each is the same figure of the numbers above it. A word that is known, where others are numbered, makes do with most of them. What goes wrong: a row at the end that
-//! is called by such a word where others are numbered, and is no such figure, is refused: whether it was measured only the table's owner knows.
+//! In: the rows of a table. Out: the rows without those, and a sentence that says which they were. A row's numbers
+//! tell, in whatever language it is called: each is the same figure of the numbers above it. A word that is known,
+//! where others are numbered, makes do with most of them. What goes wrong: a row at the end that is called by such a
+//! word where others are numbered, and is no such figure, is refused: whether it was measured only the table's owner
+//! knows.
 
 use camino::Utf8Path;
 
@@ -153,7 +155,8 @@ fn label(row: &Fields) -> Option<(usize, &str)> {
     number(&row[column]).is_none().then(|| (column, &row[column]))
 }
 
-/// Whether a row has the name of a figure where those above are numbered; names that are words may be any, `min` that of a pose.
+/// Whether a row has the name of a figure where those above are numbered; names that are words may be any, `min` that
+/// of a pose.
 fn is_called_one(above: &[(u64, Fields)], row: &Fields) -> bool {
     let is_numbered = |cell: &str| cell.is_empty() || cell.contains(|c: char| c.is_ascii_digit());
     label(row).is_some_and(|(column, label)| {

@@ -1,7 +1,8 @@
 //! Where the cameras really stand, from poses that were measured already.
 //!
-//! In: rows of `measurements.csv` whose groups are those of the plan. Out: `cam_from_base` of each group, fitted by the nominal robot:
-//! points, and points beside them where the orientation was measured too, brought together by a rigid motion (Kabsch, 1976).
+//! In: rows of `measurements.csv` whose groups are those of the plan. Out: `cam_from_base` of each group, fitted by the
+//! nominal robot: points, and points beside them where the orientation was measured too, brought together by a rigid
+//! motion (Kabsch, 1976).
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

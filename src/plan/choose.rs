@@ -1,9 +1,10 @@
-//! The poses that tell most: those that make the mean variance of the target's place over the spheres least (I-optimality, Fedorov).
+//! The poses that tell most: those that make the mean variance of the target's place over the spheres least
+//! (I-optimality, Fedorov).
 //!
-//! In: white rows of the candidates. Out: which ones, and the accuracy by their number. Method: greedily one after the other, then
-//! exchanges of each for a better one until none is. A pose changes the covariance by a term of rank three (Woodbury), so that a
-//! candidate costs two quadratic forms; gains that were once small mostly stay small, so that only the head of the list is reckoned anew
-//! (lazy evaluation, Minoux 1978).
+//! In: white rows of the candidates. Out: which ones, and the accuracy by their number. Method: greedily one after the
+//! other, then exchanges of each for a better one until none is. A pose changes the covariance by a term of rank three
+//! (Woodbury), so that a candidate costs two quadratic forms; gains that were once small mostly stay small, so that
+//! only the head of the list is reckoned anew (lazy evaluation, Minoux 1978).
 
 use nalgebra::{DMatrix, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -103,7 +104,8 @@ impl Information {
     }
 }
 
-/// A step through a list of this length that meets every place: near the golden section of it, and without a common divisor.
+/// A step through a list of this length that meets every place: near the golden section of it, and without a common
+/// divisor.
 fn stride(length: usize) -> usize {
     let divisor = |mut a: usize, mut b: usize| {
         while b > 0 {

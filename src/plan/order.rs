@@ -1,4 +1,5 @@
-//! The order of the run: placement by placement, the centre first, then ways between poses as short for the joints as can be found.
+//! The order of the run: placement by placement, the centre first, then ways between poses as short for the joints as
+//! can be found.
 
 use super::pool::Candidate;
 use super::scene::Placement;
@@ -17,8 +18,8 @@ pub struct Planned {
     pub left_from_target: Transform,
 }
 
-/// A way's length: the largest turn of a joint, which is what it takes time for, and a little of all others. A sliding joint's mm count
-/// as milliradians.
+/// A way's length: the largest turn of a joint, which is what it takes time for, and a little of all others. A sliding
+/// joint's mm count as milliradians.
 fn way(robot: &Robot, a: &[f64], b: &[f64]) -> f64 {
     let turn =
         |(joint, (a, b)): (&crate::robot::Joint, (&f64, &f64))| (a - b).abs() * if joint.slides { 1e-3 } else { 1.0 };

@@ -1,7 +1,7 @@
 //! Candidates: places and turns of the target in the field of a placement, with the readings that bring it there.
 //!
-//! Draws come from Weyl's sequence, shifted by the seed: the same candidates whatever the number of threads. Inverse kinematics starts
-//! from the postures found at the placement's middle, so that each candidate is near one of them.
+//! Draws come from Weyl's sequence, shifted by the seed: the same candidates whatever the number of threads. Inverse
+//! kinematics starts from the postures found at the placement's middle, so that each candidate is near one of them.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -246,8 +246,8 @@ impl Pool<'_> {
     }
 }
 
-/// Draws over which a center is tilted and shifted more and more, where the arm cannot hold it upright in the middle: as far as fresh poses
-/// are. From there to the last draw it is tilted as far as the cameras see it and turned any way.
+/// Draws over which a center is tilted and shifted more and more, where the arm cannot hold it upright in the middle:
+/// as far as fresh poses are. From there to the last draw it is tilted as far as the cameras see it and turned any way.
 const UPRIGHT_DRAWS: f64 = 50.0;
 const CENTER_DRAWS: usize = 250;
 

@@ -1,7 +1,9 @@
-//! What poses tell about the robot, and how well its target can be placed afterwards: nothing needs to have been measured.
+//! What poses tell about the robot, and how well its target can be placed afterwards: nothing needs to have been
+//! measured.
 //!
-//! Rows are those of `identify`'s position model: the target's derivatives by the robot's parameters and by the placement's own rigid
-//! transform, whitened by the point's covariance. Accuracy is that of fresh poses on all spheres after one rigid fit.
+//! Rows are those of `identify`'s position model: the target's derivatives by the robot's parameters and by the
+//! placement's own rigid transform, whitened by the point's covariance. Accuracy is that of fresh poses on all spheres
+//! after one rigid fit.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 use serde::Serialize;
@@ -21,8 +23,8 @@ pub const FRAME: usize = 6;
 /// Relative to the longest column, below which poses do not determine a direction: as `identify` has it.
 const RANK_TOLERANCE: f64 = 1e-4;
 
-/// Standard deviations before anything is measured: what workshops get wrong (mm, mrad), how well a target is mounted (mm), and no
-/// knowledge of where the cameras stand (mrad, mm).
+/// Standard deviations before anything is measured: what workshops get wrong (mm, mrad), how well a target is mounted
+/// (mm), and no knowledge of where the cameras stand (mrad, mm).
 const LENGTH_MM: f64 = 1.0;
 const ANGLE_MRAD: f64 = 10.0;
 const TARGET_MM: f64 = 5.0;
@@ -67,12 +69,14 @@ pub struct Problem {
     centers_mm: Vec<Vector3<f64>>,
     /// Fresh poses: place and derivatives less the rigid motion.
     pub(super) fresh: Vec<(Vector3<f64>, DMatrix<f64>)>,
-    /// Mean over the fresh poses of the products of derivatives: the mean square error is its product with the covariance.
+    /// Mean over the fresh poses of the products of derivatives: the mean square error is its product with the
+    /// covariance.
     pub(super) weight: DMatrix<f64>,
 }
 
 impl Problem {
-    /// Of a robot and fresh poses. Its parameters are those of the chain, beta of parallel axes, and the terms that its file has.
+    /// Of a robot and fresh poses. Its parameters are those of the chain, beta of parallel axes, and the terms that its
+    /// file has.
     pub fn new(robot: &Robot, placements: &[Placement], fresh: Vec<Candidate>) -> Problem {
         let mut parameters = robot.mdh_parameters();
         parameters.extend(robot.beta_parameters());

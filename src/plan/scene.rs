@@ -25,7 +25,8 @@ const STARTS: usize = 200;
 const PAPER_CENTERS_MM: [[f64; 3]; 4] =
     [[200.0, 0.0, 379.0], [-200.0, 0.0, 379.0], [0.0, 200.0, 379.0], [0.0, -230.0, 379.0]];
 
-/// Azimuth of the flange in the paper's plan as `simulate` reads it, deg: level, and 30 degrees off the line of the first two points.
+/// Azimuth of the flange in the paper's plan as `simulate` reads it, deg: level, and 30 degrees off the line of the
+/// first two points.
 const PAPER_AZIMUTH_DEG: f64 = -30.0;
 
 /// A rig with the target before it.
@@ -104,7 +105,8 @@ impl Scene {
         self.rig.sees_plate(left_from_target, (w + margin_mm, h + margin_mm), BORDER)
     }
 
-    /// Whether the pose is one to plan: wholly seen, its printed side to the cameras, in the depth of field, not too oblique.
+    /// Whether the pose is one to plan: wholly seen, its printed side to the cameras, in the depth of field, not too
+    /// oblique.
     pub fn accepts(&self, field_from_target: &Transform) -> bool {
         let normal = field_from_target.rotation * Vector3::z();
         normal.angle(&Vector3::z()) <= self.tilt_rad
@@ -118,7 +120,8 @@ impl Scene {
         self.left_from_field.translation.vector.norm() * share(&self.rig.left).min(share(&self.rig.right))
     }
 
-    /// Covariance of the measured mark point, left camera's frame, mm^2: corners and repeatability. `None` where no ray meets.
+    /// Covariance of the measured mark point, left camera's frame, mm^2: corners and repeatability. `None` where no ray
+    /// meets.
     pub fn covariance_mm2(&self, left_from_target: &Transform, noise: &PoseNoise) -> Option<Matrix3<f64>> {
         if let Some(sigma) = noise.given_mm {
             return Some(Matrix3::identity() * sigma * sigma);
@@ -161,8 +164,8 @@ pub fn base_from_flange(robot: &Robot, base_from_target: &Transform) -> Transfor
     base_from_target * flange_from_target(robot).inverse()
 }
 
-/// The placements: one direction of the flange for all spheres as in the paper, the first that all of them can have; a sphere of its own
-/// direction where there is none.
+/// The placements: one direction of the flange for all spheres as in the paper, the first that all of them can have; a
+/// sphere of its own direction where there is none.
 pub fn placements(robot: &Robot, scene: &Scene, settings: &Settings) -> Result<Vec<Placement>> {
     // The paper's spheres are scaled by the reach.
     let scale = robot.reach_mm() / Robot::paper().reach_mm();

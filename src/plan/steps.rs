@@ -53,8 +53,8 @@ pub fn plan(robot: &Robot, scene: &Scene, settings: &Settings, measured: Measure
     })
 }
 
-/// The nearest middle of a sphere in place of a group's, mm, about which the arm reaches enough places: nearer to the base's axis, and turned about
-/// it, by itself. `None` where there is none.
+/// The nearest middle of a sphere in place of a group's, mm, about which the arm reaches enough places: nearer to the
+/// base's axis, and turned about it, by itself. `None` where there is none.
 fn reached_mm(robot: &Robot, scene: &Scene, settings: &Settings, group: &str) -> Option<[f64; 3]> {
     const SHARES: [f64; 6] = [1.0, 0.9, 0.8, 0.7, 0.6, 0.5];
     const MOST_TRIED: usize = 40;

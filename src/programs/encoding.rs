@@ -1,7 +1,8 @@
 //! A program's bytes as text, and back.
 //!
-//! Controllers and editors write comments in the code page of their country. Where the bytes are no UTF-8 each is read as the character of its
-//! number (Latin-1), so that any file comes back to the byte, whatever its code page: instructions and numbers are ASCII in all of them.
+//! Controllers and editors write comments in the code page of their country. Where the bytes are no UTF-8 each is read
+//! as the character of its number (Latin-1), so that any file comes back to the byte, whatever its code page:
+//! instructions and numbers are ASCII in all of them.
 
 /// What a program's text was read from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

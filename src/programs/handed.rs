@@ -1,8 +1,8 @@
 //! Variables that are handed to something that may write into them.
 //!
-//! In: the code without comments and strings. Out: names of variables that stand as an argument of a call which is not known to read
-//! alone, the file's own routines included. Constants are left out. A call is what has brackets behind it, and where the language
-//! has calls without them the word before the first argument.
+//! In: the code without comments and strings. Out: names of variables that stand as an argument of a call which is not
+//! known to read alone, the file's own routines included. Constants are left out. A call is what has brackets behind
+//! it, and where the language has calls without them the word before the first argument.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -103,7 +103,8 @@ impl<'a> Place<'a> {
                     self.begin();
                 }
                 _ if !self.open.is_empty() || !self.calls.bare => {}
-                // A text, a negative number or a switch may stand first; between signs of per cent stands the name of a routine.
+                // A text, a negative number or a switch may stand first; between signs of per cent stands the name of a
+                // routine.
                 ',' | '\\' => self.given = self.given.or(Some(!self.reads(self.last))),
                 '%' => self.given = Some(true),
                 _ => {}

@@ -42,7 +42,8 @@ impl Language {
         Language::ALL.into_iter().find(|language| language.known().1.contains(&ending.as_str()))
     }
 
-    /// The language of a text whose file has another ending, by what every program of it begins with or holds; and the ending that says it.
+    /// The language of a text whose file has another ending, by what every program of it begins with or holds; and the
+    /// ending that says it.
     pub fn seen_in(text: &str) -> Option<(Language, &'static str)> {
         let starts = |word: &str| text.lines().any(|line| line.trim_start().starts_with(word));
         let calls = |word: &str| text.lines().any(|line| line.trim_start().starts_with(&format!("{word}(")));
@@ -131,7 +132,8 @@ impl Joints<'_> {
         self.slides.len()
     }
 
-    /// What a number of a target is times degrees (mm). Metres of UR's language are the exception among the lengths; no UR slides.
+    /// What a number of a target is times degrees (mm). Metres of UR's language are the exception among the lengths; no
+    /// UR slides.
     pub(super) fn factor(&self, language: Language, pulses: bool, joint: usize) -> f64 {
         match language {
             _ if self.slides[joint] && !pulses => 1.0,

@@ -1,4 +1,5 @@
-//! Programs read: every instruction that moves the robot, with the joint targets that it moves by, and the text with other readings.
+//! Programs read: every instruction that moves the robot, with the joint targets that it moves by, and the text with
+//! other readings.
 
 use std::ops::Range;
 
@@ -23,8 +24,8 @@ impl Program {
         Ok(Program { targets, motions })
     }
 
-    /// Places in the list of the targets that the program moves by; of a file without motions all whose language gives joint targets
-    /// a type.
+    /// Places in the list of the targets that the program moves by; of a file without motions all whose language gives
+    /// joint targets a type.
     pub fn moved_by(&self, language: Language) -> Vec<usize> {
         if self.motions.is_empty() && language != Language::UrScript {
             return (0..self.targets.len()).collect();
@@ -36,7 +37,8 @@ impl Program {
     }
 }
 
-/// The joint targets of a program, in its order: those that it moves by, and what is plainly one though nothing moves by it.
+/// The joint targets of a program, in its order: those that it moves by, and what is plainly one though nothing moves
+/// by it.
 pub fn targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Target>, String> {
     let program = Program::read(language, text, joints)?;
     if language != Language::UrScript {

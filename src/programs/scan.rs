@@ -25,7 +25,8 @@ pub fn word(text: &str, at: usize, word: &str) -> Option<usize> {
     same.then_some(start + word.len())
 }
 
-/// Numbers, or what else is a `number` in a language, from `at` with commas between, up to `most` of them, and the place behind the last.
+/// Numbers, or what else is a `number` in a language, from `at` with commas between, up to `most` of them, and the
+/// place behind the last.
 pub fn list(text: &str, at: usize, most: usize, number: fn(&str, usize) -> Option<Number>) -> (Vec<Number>, usize) {
     let (mut numbers, mut end) = (Vec::new(), at);
     while numbers.len() < most {
@@ -53,7 +54,8 @@ pub fn labelled(text: &str, at: usize, labels: &[String]) -> Option<Vec<Number>>
     Some(numbers)
 }
 
-/// A target of these numbers; named by its line where it has no name. `open` is the bracket that it begins with, where it has one.
+/// A target of these numbers; named by its line where it has no name. `open` is the bracket that it begins with, where
+/// it has one.
 pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>, open: Option<usize>) -> Option<Target> {
     let (first, last) = (numbers.first()?.1.start, numbers.last()?.1.end);
     let line = line(text, first);
@@ -72,8 +74,8 @@ pub fn line(text: &str, at: usize) -> u64 {
     1 + text[..at].bytes().filter(|b| *b == b'\n').count() as u64
 }
 
-/// The text with blanks in place of comments (from `mark` to the line's end) and of what stands between double quotes on a line; of the same
-/// length.
+/// The text with blanks in place of comments (from `mark` to the line's end) and of what stands between double quotes
+/// on a line; of the same length.
 pub fn code(text: &str, mark: &str) -> String {
     let mut out = String::with_capacity(text.len());
     let (mut quoted, mut comment) = (false, false);

@@ -1,8 +1,9 @@
 //! What a program writes into its variables.
 //!
-//! In: the code without comments and strings, and the joint targets written as numbers in it. Out: by variable, the targets that it can hold.
-//! A variable that is given anything else anywhere (a computed value, one of its fields, a routine's parameter), or is handed to
-//! something that may write into it, holds what this file does not say. Variables of one name in several routines are taken together, so that doubt about one is doubt about all.
+//! In: the code without comments and strings, and the joint targets written as numbers in it. Out: by variable, the
+//! targets that it can hold. A variable that is given anything else anywhere (a computed value, one of its fields, a
+//! routine's parameter), or is handed to something that may write into it, holds what this file does not say. Variables
+//! of one name in several routines are taken together, so that doubt about one is doubt about all.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;

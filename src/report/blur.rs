@@ -16,7 +16,8 @@ const UNEVEN: f64 = 1.5;
 /// Blur (px) below which the pixels' own width limits a corner, and not the lens.
 const SHARP_PX: f64 = 1.0;
 
-/// Blur (px) above which a fine edge is lost and sharper pictures would measure better: the fit's scatter grows with its root.
+/// Blur (px) above which a fine edge is lost and sharper pictures would measure better: the fit's scatter grows with
+/// its root.
 const SOFT_PX: f64 = 1.5;
 
 /// Blur (px) above which pictures are better taken again.

@@ -1,4 +1,5 @@
-//! The guide as one HTML page: the pages' Markdown in the frame of the reports, with a table of contents. Pictures are in the file.
+//! The guide as one HTML page: the pages' Markdown in the frame of the reports, with a table of contents. Pictures are
+//! in the file.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -8,7 +9,8 @@ use pulldown_cmark::{CowStr, Event, HeadingLevel, Options, Parser, Tag, TagEnd};
 use super::page;
 use crate::guide::{self, Page, Picture};
 
-/// What a book has beyond a report. Narrow screens show a row of a table as a list of its cells, each with its column's name.
+/// What a book has beyond a report. Narrow screens show a row of a table as a list of its cells, each with its column's
+/// name.
 const STYLE: &str = "
 nav ol { columns: 2 300px; padding-left: 24px; } nav li { break-inside: avoid; } nav code { color: var(--soft); }
 section { margin-top: 48px; } section > h2 { font-size: 21px; } h3 { font-size: 16px; margin: 24px 0 6px; }

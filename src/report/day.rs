@@ -1,7 +1,7 @@
 //! `report.html`: rig, measurements and robot of one day on a page that a quality department can sign.
 //!
-//! It repeats what the commands wrote and computes nothing. Figures stand beside the terms of VDI/VDE 2634 part 1 and ISO 9283, and it is
-//! said what a test by those standards asks for beyond them.
+//! It repeats what the commands wrote and computes nothing. Figures stand beside the terms of VDI/VDE 2634 part 1 and
+//! ISO 9283, and it is said what a test by those standards asks for beyond them.
 
 use maud::{Markup, html};
 use serde_json::Value;
@@ -25,8 +25,8 @@ pub struct Day {
 }
 
 impl Day {
-    /// True where nothing stands against the results: the rig's verdict is a pass, each was made of the one before it, and the robot may be
-    /// used.
+    /// True where nothing stands against the results: the rig's verdict is a pass, each was made of the one before it,
+    /// and the robot may be used.
     pub fn is_good(&self) -> bool {
         self.breaks.is_empty()
             && self.check.as_ref().is_none_or(|check| text(check, "/verdict") == "pass")
@@ -54,7 +54,8 @@ fn text<'a>(value: &'a Value, pointer: &str) -> &'a str {
     value.pointer(pointer).and_then(Value::as_str).unwrap_or("n/a")
 }
 
-/// Figures of verify rows are those without the ones that fit far worse than the rest, where `identify` judges by these.
+/// Figures of verify rows are those without the ones that fit far worse than the rest, where `identify` judges by
+/// these.
 fn figure<'a>(value: &'a Value, pointer: &str) -> Option<&'a Value> {
     let judged = pointer.replacen("/verify/", "/verify_without_strays/", 1);
     value.pointer(&judged).or_else(|| value.pointer(pointer))

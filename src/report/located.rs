@@ -18,7 +18,8 @@ fn line(what: &str, record: &TransformRecord) -> String {
     format!("{what}: {shift}{turn}")
 }
 
-/// Whether the robot agrees with the points, the placement, the error to expect; `is_doubted` where warnings speak against the rows.
+/// Whether the robot agrees with the points, the placement, the error to expect; `is_doubted` where warnings speak
+/// against the rows.
 pub fn summary(placement: &PlacementFile, fit: &Fit, is_doubted: bool, out: &OutDir) -> String {
     let poses = fit.poses;
     let mut lines = Vec::new();

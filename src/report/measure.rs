@@ -1,4 +1,5 @@
-//! `measure.html` and the table on stdout: where the target was, how well that is known, and whether the rig is the calibrated one.
+//! `measure.html` and the table on stdout: where the target was, how well that is known, and whether the rig is the
+//! calibrated one.
 
 use std::f64::consts::TAU;
 
@@ -37,8 +38,8 @@ pub struct Thumbnail {
 pub struct Extras {
     /// The worst poses and all failures.
     pub thumbnails: Vec<Thumbnail>,
-    /// Distances to the group's centre as the nominal robot was sent, and what was measured beyond them, mm; empty where no robot of so many
-    /// joints is known.
+    /// Distances to the group's centre as the nominal robot was sent, and what was measured beyond them, mm; empty
+    /// where no robot of so many joints is known.
     pub distances: Vec<(f64, f64)>,
     /// What is said against the rig.
     pub doubts: Vec<String>,

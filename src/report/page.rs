@@ -1,4 +1,5 @@
-//! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only to turn a view in space.
+//! The frame of every HTML report: one file, no network, readable on paper, on a phone and in the dark; a script only
+//! to turn a view in space.
 
 use super::drawing::script::SCRIPT;
 use crate::diagnostic::capital;
@@ -152,7 +153,8 @@ fn before_the_end(page: String, more: &Markup) -> String {
     }
 }
 
-/// The box that says first what the reader came for: a word or two, the numbers that matter most with what they are, and a sentence.
+/// The box that says first what the reader came for: a word or two, the numbers that matter most with what they are,
+/// and a sentence.
 pub fn verdict(tone: Tone, headline: &str, numbers: &[(String, impl Render)], explanation: &str) -> Markup {
     html! {
         div class={ "verdict " (tone.class()) } {

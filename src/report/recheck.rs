@@ -1,4 +1,5 @@
-//! `recheck.html` and the lines on stdout: whether the rig still stands, what the pairs would have shown, and how it stood before.
+//! `recheck.html` and the lines on stdout: whether the rig still stands, what the pairs would have shown, and how it
+//! stood before.
 
 use maud::{Markup, html};
 
@@ -160,7 +161,8 @@ pub(super) fn compared(found: usize, noun: &str, standing: Standing, [name, of_o
     }
 }
 
-/// The changes of all checks over their number; where nothing changed there is none. `beyond`: what a change above the tolerance means.
+/// The changes of all checks over their number; where nothing changed there is none. `beyond`: what a change above the
+/// tolerance means.
 pub(super) fn history(checks: &[Check], tolerance_mm: f64, title: &str, beyond: &str) -> Result<Markup> {
     let over = |of: fn(&Check) -> f64| checks.iter().enumerate().map(move |(i, check)| ((i + 1) as f64, of(check)));
     let svg = Plot::new(title, "check", "mm")

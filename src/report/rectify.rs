@@ -23,8 +23,8 @@ const LINES: u32 = 24;
 /// Length at which the largest difference is drawn, as a share of the picture's width.
 const LONGEST_ARROW: f64 = 0.06;
 
-/// Rows that differ by more, px RMS, are no common ones: dense stereo looks for a point along one row. Disparities that are off by more are as far from
-/// where it finds one.
+/// Rows that differ by more, px RMS, are no common ones: dense stereo looks for a point along one row. Disparities that
+/// are off by more are as far from where it finds one.
 const AGREE_PX: f64 = 0.5;
 
 /// What the board says against the rectified pictures.

@@ -1,4 +1,5 @@
-//! `verify.html` and the lines on stdout: whether a robot still is the identified one, and what the poses would have shown.
+//! `verify.html` and the lines on stdout: whether a robot still is the identified one, and what the poses would have
+//! shown.
 
 use maud::html;
 
@@ -132,7 +133,8 @@ fn cells(recheck: &Recheck) -> Vec<[String; 6]> {
     recheck.causes.iter().map(of).chain(placements).collect()
 }
 
-/// The same for a terminal of 80 columns: change with its interval, unit, its effect, what would be seen and its effect.
+/// The same for a terminal of 80 columns: change with its interval, unit, its effect, what would be seen and its
+/// effect.
 fn lines(recheck: &Recheck) -> Table {
     let four = |value: f64| number(Some(value), 4);
     let mut table = Table::new(["cause", "changed by", "", "mm", "seen", "mm"]);

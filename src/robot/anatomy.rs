@@ -1,10 +1,11 @@
 //! Which joints of an arm are its shoulder, elbow and wrist, from the chain's geometry alone.
 //!
-//! The wrist is the last but one joint. The shoulder is the first joint whose axis is not that of the base: what it turns,
-//! gravity pulls at. The elbow is the joint between them that is farthest from both: the largest of the lesser of two
-//! distances, from its origin to the shoulder's axis and from the wrist's origin to its own axis, both as means over postures
-//! (a joint that turns the upper arm about itself moves the wrist by little, a hinge by all of the forearm). That is joint 3 of six-axis
-//! arms and joint 4 of arms with seven. What goes wrong: arms with fewer than four joints have none of it.
+//! The wrist is the last but one joint. The shoulder is the first joint whose axis is not that of the base: what it
+//! turns, gravity pulls at. The elbow is the joint between them that is farthest from both: the largest of the lesser
+//! of two distances, from its origin to the shoulder's axis and from the wrist's origin to its own axis, both as means
+//! over postures (a joint that turns the upper arm about itself moves the wrist by little, a hinge by all of the
+//! forearm). That is joint 3 of six-axis arms and joint 4 of arms with seven. What goes wrong: arms with fewer than
+//! four joints have none of it.
 
 use nalgebra::{Point3, Vector3};
 

@@ -1,10 +1,11 @@
 //! From the joints' axes in space to modified Denavit-Hartenberg parameters.
 //!
-//! In: each joint's axis (a line, root frame, all readings zero) and the flange's pose there, as a URDF gives them. Out: a [`Robot`]
-//! with the same flange poses at all readings, whose constant transforms at both ends take what the parameters can't.
-//! Method: common normals (Craig, "Introduction to Robotics"); for nearly parallel axes, whose common normal runs away, the plane
-//! perpendicular to the first axis and a rotation about y (Hayati, 1983). Exact up to rounding: by the product of exponentials
-//! (Brockett, 1984) the axes and the flange at zero readings say all about a chain.
+//! In: each joint's axis (a line, root frame, all readings zero) and the flange's pose there, as a URDF gives them.
+//! Out: a [`Robot`] with the same flange poses at all readings, whose constant transforms at both ends take what the
+//! parameters can't. Method: common normals (Craig, "Introduction to Robotics"); for nearly parallel axes, whose common
+//! normal runs away, the plane perpendicular to the first axis and a rotation about y (Hayati, 1983). Exact up to
+//! rounding: by the product of exponentials (Brockett, 1984) the axes and the flange at zero readings say all about a
+//! chain.
 
 use nalgebra::{Matrix3, Point3, UnitQuaternion, Vector3};
 
@@ -12,7 +13,8 @@ use super::parameters::PARALLEL_SIN;
 use super::{Corrections, Ends, Joint, Robot};
 use crate::geometry::{Transform, transform_from_matrix};
 
-/// Offset of a nearly parallel axis below which its direction is left open, mm: what is dropped is far below a nanometre.
+/// Offset of a nearly parallel axis below which its direction is left open, mm: what is dropped is far below a
+/// nanometre.
 const COINCIDENT_MM: f64 = 1e-11;
 
 /// The flange's z counts as along the last axis up to this sine: a billionth of a mm at a metre.
@@ -90,7 +92,8 @@ fn clean(a_from_b: Transform) -> Transform {
     if small { Transform::identity() } else { a_from_b }
 }
 
-/// Frame 0, the link to the first joint, and its frame before its own turn. A first axis that is vertical leaves frame 0 parallel to the root.
+/// Frame 0, the link to the first joint, and its frame before its own turn. A first axis that is vertical leaves frame
+/// 0 parallel to the root.
 fn base(first: Option<&Axis>) -> (Transform, Joint, OnAxis) {
     let at = |origin, x| OnAxis { origin, x, z: Vector3::z() };
     let Some(axis) = first else {

@@ -73,7 +73,8 @@ impl Torques {
         }
     }
 
-    /// The levers of a unit weight at `point` about x and y of the link before `joint` (from 0), at the foot of its axis, m.
+    /// The levers of a unit weight at `point` about x and y of the link before `joint` (from 0), at the foot of its
+    /// axis, m.
     pub fn levers_across_m(&self, joint: usize, point: LoadPoint) -> [f64; 2] {
         match (self.axes.get(joint), self.place(point)) {
             (Some(axes), Some(place)) => [axes.x, axes.y].map(|axis| self.torque(&axis, &axes.foot, &place)),
@@ -160,7 +161,8 @@ mod tests {
 
     #[test]
     fn a_bearing_yields_across_its_axis_and_not_about_it() {
-        // The arm lies flat along -x of the base; a soft bearing of the base's axis lets it down, and turns it nowhere else.
+        // The arm lies flat along -x of the base; a soft bearing of the base's axis lets it down, and turns it nowhere
+        // else.
         let mut robot = Robot::paper();
         let flat = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, 0.0, 0.0];
         let stiff = robot.target_mm(&flat);

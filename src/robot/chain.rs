@@ -45,9 +45,10 @@ impl Default for Joint {
     }
 }
 
-/// What stands before the first and behind the last joint's frame: constant transforms that no calibration changes, the identity by default.
-/// A drawing's base and flange need not be the frames of the Denavit-Hartenberg chain: `[base]` and `[flange]` of a robot file
-/// say where they are, so that an imported chain reaches exactly the flange poses of its source.
+/// What stands before the first and behind the last joint's frame: constant transforms that no calibration changes, the
+/// identity by default. A drawing's base and flange need not be the frames of the Denavit-Hartenberg chain: `[base]`
+/// and `[flange]` of a robot file say where they are, so that an imported chain reaches exactly the flange poses of its
+/// source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ends {
     /// Frame 0 of the chain in the root frame of its source.
@@ -104,7 +105,8 @@ impl Joint {
 }
 
 impl Robot {
-    /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad (mm where it slides); corrections are applied.
+    /// The flange's frame (the last joint's) in the base frame. One commanded angle a joint, rad (mm where it slides);
+    /// corrections are applied.
     pub fn base_from_flange(&self, joints_rad: &[f64]) -> Transform {
         debug_assert_eq!(joints_rad.len(), self.joints.len());
         let bent = self.bent(joints_rad);

@@ -25,11 +25,12 @@ pub struct Check {
     /// Why, in one sentence; empty where there is nothing to say.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub reason: String,
-    /// Whether links are farther from the nominal robot's than any maker builds them, so that whatever is made with both may be off by as much.
+    /// Whether links are farther from the nominal robot's than any maker builds them, so that whatever is made with
+    /// both may be off by as much.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub out_of_tolerance: bool,
-    /// How the joints of this robot are counted otherwise than the nominal robot's file says, and what to mend: readings for the one mean something
-    /// else for the other.
+    /// How the joints of this robot are counted otherwise than the nominal robot's file says, and what to mend:
+    /// readings for the one mean something else for the other.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub mended: Vec<String>,
 }

@@ -1,16 +1,16 @@
-//! What the joints do beyond the commanded angle: sag and bending under gravity, once- and twice-a-turn errors of the drives, and
-//! axes that wobble as they turn.
+//! What the joints do beyond the commanded angle: sag and bending under gravity, once- and twice-a-turn errors of the
+//! drives, and axes that wobble as they turn.
 //!
-//! In: the commanded angles. Out: the small angle that is added to each of them, and how far each joint's bearing tilts.
-//! Sag of joint j is its compliance times the torque of unit weights at origins of the chain and at the tool about its axis,
-//! on the robot's own chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q + d cos 2q`; a coupling
-//! is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
-//! Bending is what a bearing and the link before it yield across the joint's axis: a tilt about x and y of the link (added to its alpha
-//! and beta) by the torque about these, with one compliance a joint.
-//! Wobble is the same tilt by the joint's own angle: `(cos q, -sin q)` and `(sin q, cos q)` about x and y, an oval bearing; the tilt
-//! that turns with the joint, `(cos q, sin q)`, is the twist of the next link.
-//! All are linear in their coefficients, so a pose contributes constants (the features) and the coefficients are parameters.
-//! The direction of gravity must be known: a robot on a wall needs its own.
+//! In: the commanded angles. Out: the small angle that is added to each of them, and how far each joint's bearing
+//! tilts. Sag of joint j is its compliance times the torque of unit weights at origins of the chain and at the tool
+//! about its axis, on the robot's own chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q
+//! + d cos 2q`; a coupling is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
+//! Bending is what a bearing and the link before it yield across the joint's axis: a tilt about x and y of the link
+//! (added to its alpha and beta) by the torque about these, with one compliance a joint. Wobble is the same tilt by the
+//! joint's own angle: `(cos q, -sin q)` and `(sin q, cos q)` about x and y, an oval bearing; the tilt that turns with
+//! the joint, `(cos q, sin q)`, is the twist of the next link. All are linear in their coefficients, so a pose
+//! contributes constants (the features) and the coefficients are parameters. The direction of gravity must be known: a
+//! robot on a wall needs its own.
 
 use nalgebra::Vector3;
 
@@ -32,7 +32,8 @@ impl LoadPoint {
         }
     }
 
-    /// The point of that name on a robot of so many joints. `elbow` and `wrist` are the third and the last but one joint.
+    /// The point of that name on a robot of so many joints. `elbow` and `wrist` are the third and the last but one
+    /// joint.
     pub fn from_name(name: &str, joint_count: usize) -> Option<LoadPoint> {
         let joint = match name {
             "tool" => return Some(LoadPoint::Tool),
@@ -44,7 +45,8 @@ impl LoadPoint {
     }
 }
 
-/// A joint yields to the torque of a unit weight: about its axis where it sags, across it where its bearing and the link before bend.
+/// A joint yields to the torque of a unit weight: about its axis where it sags, across it where its bearing and the
+/// link before bend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GravityTerm {
     /// The joint, from 0.
@@ -82,7 +84,8 @@ impl Wave {
         }
     }
 
-    /// The tilt about x and y of a wobble at the commanded angle: this wave about x, with that which goes with it about y.
+    /// The tilt about x and y of a wobble at the commanded angle: this wave about x, with that which goes with it about
+    /// y.
     pub fn across(self, q_rad: f64) -> [f64; 2] {
         let order = if matches!(self, Wave::Sin | Wave::Cos) { 1.0 } else { 2.0 };
         let (sin, cos) = (order * q_rad).sin_cos();
@@ -103,7 +106,8 @@ impl Wave {
     }
 }
 
-/// One wave of one joint: of its angle, or, where its axis wobbles, of the tilt about x of the link before (see [`Wave::across`]).
+/// One wave of one joint: of its angle, or, where its axis wobbles, of the tilt about x of the link before (see
+/// [`Wave::across`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HarmonicTerm {
     /// The joint, from 0.

@@ -1,4 +1,5 @@
-//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm, and what the run that found it says of its use.
+//! `robot.toml`: a robot's parameters as a person writes them, degrees and mm, and what the run that found it says of
+//! its use.
 
 use camino::Utf8Path;
 use nalgebra::Vector3;
@@ -110,8 +111,8 @@ struct GravityTermRecord {
     k_mrad_per_m: f64,
 }
 
-/// A table with terms: what bearings and links yield across the joints' axes (`[bending]`, in the form of `[gravity]`), waves in the commanded
-/// angle (periodic errors of the drives, or the tilt of their axes), couplings.
+/// A table with terms: what bearings and links yield across the joints' axes (`[bending]`, in the form of `[gravity]`),
+/// waves in the commanded angle (periodic errors of the drives, or the tilt of their axes), couplings.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Terms<T> {

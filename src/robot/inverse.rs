@@ -1,9 +1,9 @@
 //! Inverse kinematics of any serial robot: joint angles that bring the flange to a pose.
 //!
-//! In: a robot with all of its terms, the pose wanted in the base frame, angles to start from. Out: angles within the joints' limits.
-//! Method: damped least squares (Levenberg-Marquardt) on the pose's six residuals; angles stay inside the limits by clamping each
-//! step. It finds the solution near its start, so callers pass several. What goes wrong: out of reach, a
-//! singular wrist, or a start on the wrong side of a limit all end in `None`.
+//! In: a robot with all of its terms, the pose wanted in the base frame, angles to start from. Out: angles within the
+//! joints' limits. Method: damped least squares (Levenberg-Marquardt) on the pose's six residuals; angles stay inside
+//! the limits by clamping each step. It finds the solution near its start, so callers pass several. What goes wrong:
+//! out of reach, a singular wrist, or a start on the wrong side of a limit all end in `None`.
 
 use std::f64::consts::TAU;
 
@@ -15,7 +15,8 @@ use crate::geometry::{Transform, rotation_vector};
 /// Length by which angles are weighed against mm: a robot's wrist at about arm's length.
 pub(super) const ARM_MM: f64 = 200.0;
 
-/// The same where the place comes first: so little that a turn that is missing moves the place by less than [`REACHED_MM`].
+/// The same where the place comes first: so little that a turn that is missing moves the place by less than
+/// [`REACHED_MM`].
 const TURN_MM: f64 = 0.02;
 
 /// The pose is reached when the target is missed by less than this, mm (angles times the arm).
@@ -36,9 +37,9 @@ fn miss(robot: &Robot, wanted: &Transform, joints_rad: &[f64]) -> Vector6<f64> {
     off(&robot.base_from_flange(joints_rad), wanted, ARM_MM)
 }
 
-/// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j` at the angles that the
-/// joints really take. A coupling moves a joint with another one's column; the slopes of sag, bending and waves, thousandths, are left out: they
-/// cost a step, not the answer.
+/// Change of the flange's pose with each joint, in the units of [`miss`]: columns `z_j x (p - o_j)` and `z_j` at the
+/// angles that the joints really take. A coupling moves a joint with another one's column; the slopes of sag, bending
+/// and waves, thousandths, are left out: they cost a step, not the answer.
 fn jacobian(robot: &Robot, joints_rad: &[f64]) -> DMatrix<f64> {
     let bent = robot.bent(joints_rad);
     let mut screws = Vec::with_capacity(robot.joints.len());
@@ -99,8 +100,9 @@ pub fn approach(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) 
     if found.arrived() { unwound(robot, base_from_flange, found, start_rad) } else { found }
 }
 
-/// The same for an arm of fewer than six joints, which turns its tool some ways only: the tool's place first, and of all readings that bring it there
-/// those by which its orientation is nearest. What is missing is said of the place alone.
+/// The same for an arm of fewer than six joints, which turns its tool some ways only: the tool's place first, and of
+/// all readings that bring it there those by which its orientation is nearest. What is missing is said of the place
+/// alone.
 pub fn approach_place(
     robot: &Robot,
     base_from_tool: &Transform,
@@ -163,8 +165,9 @@ fn descend(
     (q, residual)
 }
 
-/// The same posture without the whole turns that the search took: each joint within half a turn of `near_rad`, as far as its limits let it. Where
-/// a joint's turn moves another one by a part of a turn (a coupling), the search's own answer stays.
+/// The same posture without the whole turns that the search took: each joint within half a turn of `near_rad`, as far
+/// as its limits let it. Where a joint's turn moves another one by a part of a turn (a coupling), the search's own
+/// answer stays.
 fn unwound(robot: &Robot, base_from_flange: &Transform, found: Approach, near_rad: &[f64]) -> Approach {
     let turned = |(joint, (&q, near)): (&Joint, (&f64, &f64))| {
         let turns = if joint.slides { 0.0 } else { ((q - near) / TAU).round() };
@@ -179,7 +182,8 @@ fn unwound(robot: &Robot, base_from_flange: &Transform, found: Approach, near_ra
     if unwound.arrived() { unwound } else { found }
 }
 
-/// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not arrive.
+/// Angles (rad) that bring the flange to `base_from_flange`, searched from `start_rad`. `None` when the search does not
+/// arrive.
 pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]) -> Option<Vec<f64>> {
     if start_rad.len() != robot.joints.len() {
         return None;
@@ -188,14 +192,16 @@ pub fn from_start(robot: &Robot, base_from_flange: &Transform, start_rad: &[f64]
     found.arrived().then_some(found.joints_rad)
 }
 
-/// On which side of its singular postures a six-axis arm is there: the sign of its Jacobian's determinant. Zero for other arms.
+/// On which side of its singular postures a six-axis arm is there: the sign of its Jacobian's determinant. Zero for
+/// other arms.
 pub fn side(robot: &Robot, joints_rad: &[f64]) -> f64 {
     let columns = jacobian(robot, joints_rad);
     if columns.is_square() { columns.determinant().signum() } else { 0.0 }
 }
 
-/// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times the arm of 200 mm.
-/// Zero in a singular posture, where small motions of the flange need large ones of the joints, and for fewer than six joints.
+/// How freely the flange moves there: the least singular value of its Jacobian, mm a rad, angles of the flange times
+/// the arm of 200 mm. Zero in a singular posture, where small motions of the flange need large ones of the joints, and
+/// for fewer than six joints.
 pub fn freedom_mm(robot: &Robot, joints_rad: &[f64]) -> f64 {
     let singular = jacobian(robot, joints_rad).singular_values();
     if singular.len() < 6 { 0.0 } else { singular.min() }

@@ -11,8 +11,8 @@ use super::{Joint, Parameter};
 /// Columns of angles are per mrad.
 pub const RAD_PER_MRAD: f64 = 1e-3;
 
-/// What a parameter's joint turns by at a pose per unit of the parameter: about its axis (first number), or, where its link tilts, about x
-/// and y of its link.
+/// What a parameter's joint turns by at a pose per unit of the parameter: about its axis (first number), or, where its
+/// link tilts, about x and y of its link.
 pub type Feature = [f64; 2];
 
 /// The screws of a chain in one pose: what each of its parameters turns about or shifts along, base frame.
@@ -78,7 +78,8 @@ impl Turn {
     }
 }
 
-/// How a joint stands at a pose, or at several: sine and cosine of its alpha, its beta and its turn, and its way along its axis, mm.
+/// How a joint stands at a pose, or at several: sine and cosine of its alpha, its beta and its turn, and its way along
+/// its axis, mm.
 #[derive(Debug, Clone, Copy)]
 pub struct Stance<T = f64> {
     pub alpha: [T; 2],
@@ -123,7 +124,8 @@ impl Screws {
         Screws { joints: screws, base_from_flange: rotation, target_mm: origin + rotation * tool_mm }
     }
 
-    /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see [`feature`]).
+    /// Derivative of the target's point, mm per mm or mrad. `feature` is the parameter's factor at this pose (see
+    /// [`feature`]).
     pub fn point_column(&self, parameter: Parameter, feature: Feature) -> Vector3<f64> {
         let p = self.target_mm;
         let column =
@@ -182,7 +184,8 @@ mod tests {
     use crate::robot::Robot;
     use crate::robot::chain::Joint;
 
-    /// Step of the central differences, mm or mrad; their error is its square times the third derivative (below 1e-3 mm).
+    /// Step of the central differences, mm or mrad; their error is its square times the third derivative (below 1e-3
+    /// mm).
     const STEP: f64 = 1e-2;
     const TOLERANCE_MM: f64 = 1e-6;
 

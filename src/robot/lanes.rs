@@ -1,8 +1,10 @@
-//! How joints stand at many poses, eight of them at a time, and where the target is there: a swarm takes millions of poses.
+//! How joints stand at many poses, eight of them at a time, and where the target is there: a swarm takes millions of
+//! poses.
 //!
-//! In: sines and cosines of the joints at eight poses, their ways. Out: the flange's rotation and the target's point at each, base frame, the same
-//! to the bit as [`super::jacobian::Screws`] has them one pose at a time with its derivatives. Poses lie side by side in arrays, which the compiler works on together
-//! (see `crate::widest`); what is not inlined there would be slower.
+//! In: sines and cosines of the joints at eight poses, their ways. Out: the flange's rotation and the target's point at
+//! each, base frame, the same to the bit as [`super::jacobian::Screws`] has them one pose at a time with its
+//! derivatives. Poses lie side by side in arrays, which the compiler works on together (see `crate::widest`); what is
+//! not inlined there would be slower.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 

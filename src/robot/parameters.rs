@@ -73,7 +73,8 @@ impl Parameter {
         }
     }
 
-    /// The joint whose angle a correction changes at a pose; `None` for the chain's own parameters, the target's and those that tilt a link.
+    /// The joint whose angle a correction changes at a pose; `None` for the chain's own parameters, the target's and
+    /// those that tilt a link.
     pub fn corrected_joint(self) -> Option<usize> {
         match self {
             Parameter::Gravity(i, _) | Parameter::Harmonic(i, _) | Parameter::Coupling(i, _) => Some(i),
@@ -105,14 +106,16 @@ impl Robot {
         (0..self.joints.len()).flat_map(joint).chain((0..3).map(Parameter::V)).collect()
     }
 
-    /// Hayati's rotation for every pair of neighbouring axes that are parallel (none before the first joint: the base is free).
+    /// Hayati's rotation for every pair of neighbouring axes that are parallel (none before the first joint: the base
+    /// is free).
     pub fn beta_parameters(&self) -> Vec<Parameter> {
         let parallel = |i: &usize| self.joints[*i].alpha_rad.sin().abs() < PARALLEL_SIN;
         (1..self.joints.len()).filter(parallel).map(Parameter::Beta).collect()
     }
 
-    /// Compliances under the arm's own weight, of the shoulder and the elbow, and of the base where its axis does not stand along
-    /// gravity, then (`tool`) under the load's of all joints from the shoulder to the wrist, those that turn a link about itself too. The joints come from the chain's geometry (see `super::anatomy`).
+    /// Compliances under the arm's own weight, of the shoulder and the elbow, and of the base where its axis does not
+    /// stand along gravity, then (`tool`) under the load's of all joints from the shoulder to the wrist, those that
+    /// turn a link about itself too. The joints come from the chain's geometry (see `super::anatomy`).
     pub fn gravity_parameters(&self, tool: bool) -> Vec<Parameter> {
         let Some(anatomy) = Anatomy::of(self) else { return Vec::new() };
         let (shoulder, elbow, wrist) = (anatomy.shoulder, anatomy.elbow, anatomy.wrist);
@@ -130,7 +133,8 @@ impl Robot {
         terms
     }
 
-    /// Compliances across the axes of the joints from the base to the wrist under the load's weight: what bearings and links yield.
+    /// Compliances across the axes of the joints from the base to the wrist under the load's weight: what bearings and
+    /// links yield.
     pub fn bending_parameters(&self) -> Vec<Parameter> {
         let Some(anatomy) = Anatomy::of(self) else { return Vec::new() };
         (0..=anatomy.wrist).map(|joint| Parameter::Bending(joint, LoadPoint::Tool)).collect()

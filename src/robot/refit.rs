@@ -1,8 +1,9 @@
-//! A robot without corrections that comes as near as it can to one with them: for formats that have no place for sag and waves.
+//! A robot without corrections that comes as near as it can to one with them: for formats that have no place for sag
+//! and waves.
 //!
-//! In: a robot with all of its terms. Out: parameters of the plain chain (beta included), and what the flange's pose is off by. Method:
-//! Gauss-Newton on the flange's places and turns at postures spread over the joints' ranges, or over those in which the robot is known;
-//! directions that no posture tells apart stay where they are (a small ridge).
+//! In: a robot with all of its terms. Out: parameters of the plain chain (beta included), and what the flange's pose is
+//! off by. Method: Gauss-Newton on the flange's places and turns at postures spread over the joints' ranges, or over
+//! those in which the robot is known; directions that no posture tells apart stay where they are (a small ridge).
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use rayon::prelude::*;
@@ -48,8 +49,8 @@ impl Residual {
 }
 
 impl Robot {
-    /// The same robot, the last link that of `drawn`: what it was turned and moved by along its axis is the tool's, for nothing that is measured at a
-    /// tool's point tells the two apart. The tool stands where it stood.
+    /// The same robot, the last link that of `drawn`: what it was turned and moved by along its axis is the tool's, for
+    /// nothing that is measured at a tool's point tells the two apart. The tool stands where it stood.
     pub fn with_last_link_of(&self, drawn: &Robot) -> Robot {
         let mut robot = self.clone();
         if let (Some(joint), Some(of_drawn)) = (robot.joints.last_mut(), drawn.joints.last()) {
@@ -140,7 +141,8 @@ mod tests {
         assert!(off.max_mm < 1e-9 && off.max_rad < 1e-12, "{off:?}");
     }
 
-    /// The refit takes what a constant can take: far less is left than if the terms were cut off, and it is told as it is.
+    /// The refit takes what a constant can take: far less is left than if the terms were cut off, and it is told as it
+    /// is.
     #[test]
     fn what_is_left_of_sag_and_waves_is_less_than_they_are() {
         let mut robot = catalogue::robot("ur5e").unwrap();

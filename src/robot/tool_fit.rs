@@ -1,8 +1,10 @@
-//! Where the target stands on the flange, and where the sensor: what a nominal chain leaves of measured points once both are solved.
+//! Where the target stands on the flange, and where the sensor: what a nominal chain leaves of measured points once
+//! both are solved.
 //!
-//! In: readings and points of one placement of the sensor. Out: the tool and what is left. Levenberg and Marquardt's method on the placement's
-//! six numbers and the tool's three, from the placement that fits best with the tool of the file (Kabsch, 1976).
-//! What goes wrong: a tool that the poses do not determine (one orientation) stays where the damping leaves it, which costs nothing.
+//! In: readings and points of one placement of the sensor. Out: the tool and what is left. Levenberg and Marquardt's
+//! method on the placement's six numbers and the tool's three, from the placement that fits best with the tool of the
+//! file (Kabsch, 1976). What goes wrong: a tool that the poses do not determine (one orientation) stays where the
+//! damping leaves it, which costs nothing.
 
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
 
@@ -10,8 +12,8 @@ use super::Robot;
 use crate::geometry::{Transform, fitted_frame, perturb, rigid_columns};
 use crate::statistics::median;
 
-/// How far off a tool is that was typed off a drawing, mm: the guide asks for no more than a centimetre, and the search for the tool's tolerance
-/// starts there.
+/// How far off a tool is that was typed off a drawing, mm: the guide asks for no more than a centimetre, and the search
+/// for the tool's tolerance starts there.
 pub const TYPED_MM: f64 = 10.0;
 
 /// Poses that are enough.
@@ -23,7 +25,8 @@ const FEWEST: usize = 4;
 /// Steps at the most.
 const STEPS: usize = 40;
 
-/// Times the middle distance beyond which a row does not take part: nine standard deviations of normal errors in three coordinates.
+/// Times the middle distance beyond which a row does not take part: nine standard deviations of normal errors in three
+/// coordinates.
 const GROSS: f64 = 6.0;
 
 /// Rounds of choosing the rows.
@@ -47,8 +50,8 @@ pub struct ToolFit {
 }
 
 impl Robot {
-    /// Middle distance of the points that this robot predicts from the measured ones, mm, once the sensor is placed; rows that miss by several
-    /// times as much do not help to place it.
+    /// Middle distance of the points that this robot predicts from the measured ones, mm, once the sensor is placed;
+    /// rows that miss by several times as much do not help to place it.
     pub fn left_mm(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<f64> {
         let rows = self.rows(joints_rad, points_mm, 1);
         let start = (placed(&rows, &self.tool_mm), self.tool_mm);
@@ -61,8 +64,8 @@ impl Robot {
         joints_rad.iter().zip(points_mm).step_by(step).map(row).collect()
     }
 
-    /// The tool with which this chain comes nearest to the points; `None` for fewer than four poses. Up to a fifth of the rows may be gross
-    /// errors (a reading that failed, a mean below the table).
+    /// The tool with which this chain comes nearest to the points; `None` for fewer than four poses. Up to a fifth of
+    /// the rows may be gross errors (a reading that failed, a mean below the table).
     pub fn fit_tool(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>], from: Start) -> Option<ToolFit> {
         let count = joints_rad.len().min(points_mm.len());
         if count < FEWEST {
@@ -71,8 +74,8 @@ impl Robot {
         fit(&self.rows(joints_rad, points_mm, count.div_ceil(POSES)), self.tool_mm, from)
     }
 
-    /// The same of cameras on the flange that see a target that stands still: seen from the flange it is the base that moves, and the tool that is found
-    /// is the target's place there.
+    /// The same of cameras on the flange that see a target that stands still: seen from the flange it is the base that
+    /// moves, and the tool that is found is the target's place there.
     pub fn fit_backwards(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<ToolFit> {
         let count = joints_rad.len().min(points_mm.len());
         let mut all = self.rows(joints_rad, points_mm, count.div_ceil(POSES).max(1));
@@ -104,8 +107,8 @@ fn fit(all: &[Row], tool_mm: Vector3<f64>, from: Start) -> Option<ToolFit> {
 pub enum Start {
     /// At the tool of the file.
     File,
-    /// There, and where that comes not near, around it, as far off as the points are apart: where the wrist alone turned, the place of the
-    /// file's tool says nothing of the sensor's.
+    /// There, and where that comes not near, around it, as far off as the points are apart: where the wrist alone
+    /// turned, the place of the file's tool says nothing of the sensor's.
     Around,
 }
 
@@ -134,8 +137,9 @@ fn middle(rows: &[Row], frame: &Transform, tool: &Vector3<f64>) -> f64 {
     median(rows.iter().map(|row| row.off(frame, tool).norm())).unwrap_or(f64::INFINITY)
 }
 
-/// A placement and a tool fitted again to the four fifths of the rows that they come nearest to, until these are the same (the concentration
-/// steps of Rousseeuw and Van Driessen, Technometrics 41, 1999), and then to all but those that miss by many times what the middle one does.
+/// A placement and a tool fitted again to the four fifths of the rows that they come nearest to, until these are the
+/// same (the concentration steps of Rousseeuw and Van Driessen, Technometrics 41, 1999), and then to all but those that
+/// miss by many times what the middle one does.
 fn without_gross(
     all: &[Row],
     (mut frame, mut tool): (Transform, Vector3<f64>),

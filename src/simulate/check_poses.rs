@@ -25,8 +25,8 @@ pub struct Holding {
 }
 
 impl Holding {
-    /// As in the presets. Below 10 degrees perspective says little about the focal length; above 30, squares get too thin.
-    /// A square board looks the same after a quarter turn, so it stays clear of one.
+    /// As in the presets. Below 10 degrees perspective says little about the focal length; above 30, squares get too
+    /// thin. A square board looks the same after a quarter turn, so it stays clear of one.
     pub const USUAL: Holding = Holding {
         tilt_deg: (10.0, 30.0),
         turn_deg: 12.0,

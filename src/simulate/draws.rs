@@ -89,7 +89,8 @@ fn mixed(value: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Standard normal deviates from 32 random bits by the inverse distribution function in a table: pictures need millions.
+/// Standard normal deviates from 32 random bits by the inverse distribution function in a table: pictures need
+/// millions.
 #[derive(Debug, Clone)]
 pub struct NormalTable {
     deviates: Vec<f32>,

@@ -1,11 +1,12 @@
 //! The truth that everything else is tested against: a rig, boards, a robot with hidden errors, and their pictures.
 //!
 //! In: [`settings::Settings`], plain data; the presets are values of it. Out: a [`world::World`] and, where wanted, its
-//! files in the formats that the commands read and write. One picture is a [`picture::scene::Scene`] given to [`picture::render::Renderer`].
+//! files in the formats that the commands read and write. One picture is a [`picture::scene::Scene`] given to
+//! [`picture::render::Renderer`].
 //!
-//! The renderer shares no formula with the corner fit that it judges: areas are exact by Green's theorem, the lens's spread is
-//! summed numerically, and both are compared with rays. What it leaves out: reflexes, motion blur, rolling shutters, and
-//! the depth of what stands behind the board, which is a blurred backdrop.
+//! The renderer shares no formula with the corner fit that it judges: areas are exact by Green's theorem, the lens's
+//! spread is summed numerically, and both are compared with rays. What it leaves out: reflexes, motion blur, rolling
+//! shutters, and the depth of what stands behind the board, which is a blurred backdrop.
 //!
 //! ```
 //! use stereocal::imaging::corners::Side;

@@ -1,8 +1,9 @@
 //! A board as it was really made: its plate, where its corners really are, and how flat it is.
 //!
-//! Each crossing of lines is off by its own pitch error and the edges run straight from crossing to crossing, so an error of
-//! one corner fades along its edges: a detector that fits edges over part of a square sees about two thirds of it. Against the
-//! true corners such a detector scatters by the other third, more than the noise in its window tells it.
+//! Each crossing of lines is off by its own pitch error and the edges run straight from crossing to crossing, so an
+//! error of one corner fades along its edges: a detector that fits edges over part of a square sees about two thirds of
+//! it. Against the true corners such a detector scatters by the other third, more than the noise in its window tells
+//! it.
 
 use nalgebra::{Point2, Point3};
 
@@ -36,7 +37,8 @@ pub struct Warp {
     pub s_um: f64,
 }
 
-/// A made board. Its frame is the drawing's: origin in the centre, x along columns, y along rows, z away from the viewer.
+/// A made board. Its frame is the drawing's: origin in the centre, x along columns, y along rows, z away from the
+/// viewer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalBoard {
     /// What it should be.
@@ -75,8 +77,8 @@ impl PhysicalBoard {
         board
     }
 
-    /// Moves and turns the print so that the drawing, laid over the inner corners by least squares, is the board's frame: that is how
-    /// any instrument finds the frame of a real board.
+    /// Moves and turns the print so that the drawing, laid over the inner corners by least squares, is the board's
+    /// frame: that is how any instrument finds the frame of a real board.
     fn lay_frame(&mut self) {
         let (columns, rows) = (self.drawing.columns(), self.drawing.rows());
         let all = || (0..columns * rows).map(|k| (k % columns, k / columns));
@@ -116,8 +118,8 @@ impl PhysicalBoard {
         Point3::new(x_mm, y_mm, self.height_mm(x_mm, y_mm))
     }
 
-    /// Where inner corner `(col, row)` really is, in the board's frame, mm: where two black squares meet at the crossing of their lines, of a black square
-    /// alone where the ink ends.
+    /// Where inner corner `(col, row)` really is, in the board's frame, mm: where two black squares meet at the
+    /// crossing of their lines, of a black square alone where the ink ends.
     pub fn corner_mm(&self, col: usize, row: usize) -> Point3<f64> {
         let p = self.crossing_mm(col + 1, row + 1);
         if self.has_saddles() {
@@ -160,8 +162,8 @@ impl PhysicalBoard {
         self.layout() != Layout::Grid
     }
 
-    /// The four corners of a face in one of the squares, in order round it, mm: it moves with the square's crossings. The ink's spread is not
-    /// that of markers, whose faces tell no place.
+    /// The four corners of a face in one of the squares, in order round it, mm: it moves with the square's crossings.
+    /// The ink's spread is not that of markers, whose faces tell no place.
     pub fn face_mm(&self, face: &Face) -> [Point2<f64>; 4] {
         let (i, j) = face.square;
         let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(di, dj)| self.crossing_mm(i + di, j + dj).coords);

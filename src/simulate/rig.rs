@@ -29,15 +29,16 @@ pub struct RigDrawing {
     pub distance_mm: f64,
     /// Angle between the two axes, rad.
     pub convergence_rad: f64,
-    /// How far the right camera stands round the field's axis from where it stands right of the left one, rad: a quarter turn puts it
-    /// below. The cameras stay upright.
+    /// How far the right camera stands round the field's axis from where it stands right of the left one, rad: a
+    /// quarter turn puts it below. The cameras stay upright.
     pub round_rad: f64,
     /// Turn of each camera about its own axis, rad.
     pub roll_rad: [f64; 2],
 }
 
 impl RigDrawing {
-    /// The paper's rig for square pictures of a size, px. The lenses differ; neither camera is quite what its drawing says.
+    /// The paper's rig for square pictures of a size, px. The lenses differ; neither camera is quite what its drawing
+    /// says.
     pub fn paper(size_px: u32) -> RigDrawing {
         let scale = f64::from(size_px) / 5120.0;
         RigDrawing {

@@ -119,8 +119,9 @@ impl<'a> Group<'a> {
         }
     }
 
-    /// Joint angles of the group's centre. Of the postures found from starts spread over the joints' ranges: the one that
-    /// leaves the flange the most freedom and its joints room, so that the sphere round it can be reached without a flip.
+    /// Joint angles of the group's centre. Of the postures found from starts spread over the joints' ranges: the one
+    /// that leaves the flange the most freedom and its joints room, so that the sphere round it can be reached without
+    /// a flip.
     fn center_start(&mut self) -> Result<Vec<f64>, Error> {
         let wanted = self.base_from_flange(self.sphere.center_mm, UnitQuaternion::identity());
         let nominal = &self.arm.nominal;
@@ -180,7 +181,8 @@ impl<'a> Group<'a> {
                 pose: format!("g{}_{number:03}", self.index + 1),
                 group: self.name(),
                 role,
-                // Rounded once more so that the file shows four digits, not the products of a binary fraction; + 0 makes -0 a 0.
+                // Rounded once more so that the file shows four digits, not the products of a binary fraction; + 0
+                // makes -0 a 0.
                 joints_deg: joints_deg.map(|deg| format!("{deg:.4}").parse().unwrap_or(deg) + 0.0).collect(),
             };
             let left_from_target = self.true_pose(&commanded);

@@ -120,10 +120,10 @@ fn made(pitch_um: f64, margin_mm: f64) -> Workmanship {
     Workmanship { pitch_um, bow_um: (0.0, 0.0), ink_spread_um: 0.0, scale_ppm: 0.0, margin_mm }
 }
 
-/// The start points of section 4.2 of the paper, and one orientation of the flange for all four, as the paper plans its path.
-/// Which one is not given there. This one is level, as cameras on a tripod look, and 30 degrees off the line of the first two
-/// points: the wrist is bent at all four. Pointing away from the robot at each point it would be all but stretched, and in
-/// postures that differ by a turn of the first joint alone, which no distance sees.
+/// The start points of section 4.2 of the paper, and one orientation of the flange for all four, as the paper plans its
+/// path. Which one is not given there. This one is level, as cameras on a tripod look, and 30 degrees off the line of
+/// the first two points: the wrist is bent at all four. Pointing away from the robot at each point it would be all but
+/// stretched, and in postures that differ by a turn of the first joint alone, which no distance sees.
 fn paper_spheres() -> Vec<Sphere> {
     let (sin, cos) = (-std::f64::consts::FRAC_PI_6).sin_cos();
     [(200.0, 0.0), (-200.0, 0.0), (0.0, 200.0), (0.0, -230.0)]

@@ -35,8 +35,8 @@ pub fn deviated(nominal: &Robot, deviations: &RobotDeviations, seed: u64) -> Rob
     robot
 }
 
-/// Effects outside of the plain model: parallel axes that are not, joints that sag, drives with periodic errors. Those of size
-/// zero are left out.
+/// Effects outside of the plain model: parallel axes that are not, joints that sag, drives with periodic errors. Those
+/// of size zero are left out.
 pub fn add_effects(robot: &mut Robot, nominal: &Robot, deviations: &RobotDeviations, seed: u64) {
     let mut draws = Draws::new(seed, Purpose::Effects, 0);
     let beta = deviations.beta_deg.to_radians();

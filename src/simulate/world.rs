@@ -120,7 +120,8 @@ impl World {
         if shot.shows_target { clutter::arm(&self.target) } else { clutter::stand(&self.check_board) }
     }
 
-    /// The scene of one side of a pair. `backdrop` is what stands behind ([`World::backdrop`]), `holder` what carries the board.
+    /// The scene of one side of a pair. `backdrop` is what stands behind ([`World::backdrop`]), `holder` what carries
+    /// the board.
     pub fn scene<'a>(&'a self, shot: &Shot, side: Side, backdrop: &'a Backdrop, holder: &'a [Patch]) -> Scene<'a> {
         let (camera, camera_from_left) = self.camera(side);
         Scene {

@@ -1,7 +1,8 @@
 //! From corners to a calibrated rig: start, screening, bundle, covariance.
 //!
-//! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the pairs that were
-//! not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell the cameras.
+//! In: the corners of all pairs. Out: the rig with its covariance, the pairs that were used with their residuals, the
+//! pairs that were not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell
+//! the cameras.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -45,11 +46,13 @@ pub struct Calibration {
     pub neighbours: NeighbourCorrelation,
     /// Factor on the covariance that follows from the weighted normal equations: what neighbours share, and the loss.
     pub inflation: f64,
-    /// What is expected of cameras and board beside the pairs: before any picture, or of lenses that are known or that each camera alone told.
+    /// What is expected of cameras and board beside the pairs: before any picture, or of lenses that are known or that
+    /// each camera alone told.
     pub priors: Priors,
     /// What the left and the right camera leave of their own pictures, the median over them, px.
     pub alone_px: [f64; 2],
-    /// Whether the lenses are those that each camera alone told, because something moved between the two pictures of the pairs.
+    /// Whether the lenses are those that each camera alone told, because something moved between the two pictures of
+    /// the pairs.
     pub each_alone: bool,
     /// How many of the first or last pairs are in it although they contradict the others.
     pub runs: usize,
@@ -69,7 +72,8 @@ pub struct Calibration {
     pub since_moment: Vec<DVector<f64>>,
     /// Whose lens was known, left and right.
     pub known_sides: [bool; 2],
-    /// Whether the pictures agree with the lenses that were known; `None` where none were, or the pictures say nothing of them.
+    /// Whether the pictures agree with the lenses that were known; `None` where none were, or the pictures say nothing
+    /// of them.
     pub lens_check: Option<LensCheck>,
     /// How the lenses that were tried predict held-out pairs; empty where the lens was forced.
     pub lens_scores: Vec<LensScore>,
@@ -81,8 +85,8 @@ impl Calibration {
         self.known_sides.iter().all(|known| *known)
     }
 
-    /// By how much each side of a tag of the board is printed farther out than it is drawn, where that moves its corners, and the expanded
-    /// uncertainty (k = 2), mm.
+    /// By how much each side of a tag of the board is printed farther out than it is drawn, where that moves its
+    /// corners, and the expanded uncertainty (k = 2), mm.
     pub fn spread_mm(&self) -> Option<[f64; 2]> {
         let spread = self.spread.as_ref()?;
         Some([self.board.spread_mm() + spread.change_mm, 2.0 * spread.sigma_mm * self.inflation.sqrt()])
@@ -98,7 +102,8 @@ impl Calibration {
         &self.values.shared.rig
     }
 
-    /// The covariance for what the rig measures from the last pair on: the one at its moment, and how it has changed since.
+    /// The covariance for what the rig measures from the last pair on: the one at its moment, and how it has changed
+    /// since.
     pub fn covariance_now(&self) -> Option<Covariance> {
         let mut covariance = self.rig().covariance.clone()?;
         self.since_moment.iter().for_each(|step| covariance.matrix += step * step.transpose());
@@ -149,11 +154,12 @@ pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Er
     calibrate_by(corners, options, false, false)
 }
 
-/// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a change of the rig
-/// can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them. How far black has spread on a
-/// grid of separate tags is found by the way.
+/// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a
+/// change of the rig can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera
+/// alone tells of them. How far black has spread on a grid of separate tags is found by the way.
 pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
-    /// Share of its standard deviation that is not worth another round, and rounds at the most: the first step is nearly the last.
+    /// Share of its standard deviation that is not worth another round, and rounds at the most: the first step is
+    /// nearly the last.
     const STILL: f64 = 0.1;
     const ROUNDS: usize = 3;
     let mut found = with_spread(corners, options, runs, by_pairs)?;
@@ -234,8 +240,8 @@ fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool)
     })
 }
 
-/// The pairs with what is chosen for them. A lens that predicts held-out pairs best may still have numbers that can be exchanged for each other,
-/// where something that no lens explains made it look better; a simpler one is taken then.
+/// The pairs with what is chosen for them. A lens that predicts held-out pairs best may still have numbers that can be
+/// exchanged for each other, where something that no lens explains made it look better; a simpler one is taken then.
 fn solved_by(
     start: &Problem,
     choose: impl Fn(Option<Lens>) -> Result<Choice, Error>,

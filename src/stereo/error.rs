@@ -70,7 +70,8 @@ pub enum Error {
     /// The box that a verdict is asked for lies where the cameras do not both look.
     #[error("no place of the box of `--volume` is seen by both cameras")]
     OutOfView {
-        /// The box in the left camera's frame that the boards' part of its picture and their depths span, mm: lowest and highest corner.
+        /// The box in the left camera's frame that the boards' part of its picture and their depths span, mm: lowest
+        /// and highest corner.
         boards_mm: [[f64; 3]; 2],
     },
     /// The distance of the cameras is not told from none: nothing can be measured by them.
@@ -160,7 +161,8 @@ pub enum Error {
         reasons(.skipped)
     )]
     Undetermined {
-        /// How many pairs there are and by how much a corner moves from one to another at most, px, where all show the board in one pose.
+        /// How many pairs there are and by how much a corner moves from one to another at most, px, where all show the
+        /// board in one pose.
         one_pose: Option<(usize, f64)>,
         /// Worst relative standard deviation of a focal length, where there is one.
         focal_sigma: Option<f64>,

@@ -1,10 +1,10 @@
 //! From corners to a calibrated rig, and from a rig to points in space.
 //!
-//! Rooms in the order of the data; imports point up this list only: `model` and `data` say what is looked for and what was seen,
-//! `solve` finds the most likely rig, `init` where to start, `pairs` which pairs belong to it, `select` which lens;
-//! `calibrate()` is all of that in turn. `volume` is where the boards were, `findings` what happened while they were photographed, `judge`
-//! measures boards with the rig and says what it is worth, `triangulate` and `board_pose` measure points and a board's pose with it, `recheck`
-//! says later whether it still stands.
+//! Rooms in the order of the data; imports point up this list only: `model` and `data` say what is looked for and what
+//! was seen, `solve` finds the most likely rig, `init` where to start, `pairs` which pairs belong to it, `select` which
+//! lens; `calibrate()` is all of that in turn. `volume` is where the boards were, `findings` what happened while they
+//! were photographed, `judge` measures boards with the rig and says what it is worth, `triangulate` and `board_pose`
+//! measure points and a board's pose with it, `recheck` says later whether it still stands.
 
 mod error;
 

@@ -1,4 +1,5 @@
-//! A rig, boards and corners whose truth is known, for the tests of this stage, and what is asked of a calibration there.
+//! A rig, boards and corners whose truth is known, for the tests of this stage, and what is asked of a calibration
+//! there.
 
 use nalgebra::{Matrix2, Point2, Point3, Vector2, Vector3};
 
@@ -45,8 +46,8 @@ pub(crate) struct World {
     pub print_mm: f64,
     /// Which print it is.
     pub print_seed: u64,
-    /// How far the windows reach along the edges, which run straight from crossing to crossing, as a share of a square; 0 sees the
-    /// crossings themselves.
+    /// How far the windows reach along the edges, which run straight from crossing to crossing, as a share of a square;
+    /// 0 sees the crossings themselves.
     pub reach: f64,
     pub poses: Vec<Transform>,
     /// Standard deviation of a corner's coordinate, px.
@@ -137,7 +138,8 @@ impl World {
         moved
     }
 
-    /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras that nobody triggers looks.
+    /// The same where the right camera turns by so much at random between pairs, as a board in a hand before cameras
+    /// that nobody triggers looks.
     pub fn corners_by_hand(&self, seed: u64, turn_deg: f64) -> Corners {
         let mut draws = Draws::new(seed, Purpose::Points, 17);
         self.corners_by(seed, || {

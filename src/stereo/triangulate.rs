@@ -1,8 +1,9 @@
 //! A point in space from its two pixels, what its corners and the calibration make it uncertain by.
 //!
-//! In: a rig, a left and a right observation. Out: the point in the left camera's frame, its covariance, its derivatives by the rig, and
-//! the gap between the two rays. Method: the middle of the shortest connection of the rays, then Gauss-Newton on the whitened
-//! reprojection residuals, which for Gaussian corners is the most likely point. Goes wrong: parallel rays, a pixel no ray belongs to.
+//! In: a rig, a left and a right observation. Out: the point in the left camera's frame, its covariance, its
+//! derivatives by the rig, and the gap between the two rays. Method: the middle of the shortest connection of the rays,
+//! then Gauss-Newton on the whitened reprojection residuals, which for Gaussian corners is the most likely point. Goes
+//! wrong: parallel rays, a pixel no ray belongs to.
 
 use nalgebra::{Matrix3, Matrix4x3, Point2, Point3, Vector2, Vector3, Vector4};
 
@@ -28,8 +29,8 @@ pub struct SpacePoint {
     pub covariance_mm2: Matrix3<f64>,
     /// Distance between the two rays where they are nearest, mm, negative where the right ray passes below the left.
     pub gap_mm: f64,
-    /// Squared whitened residual that the best point leaves in both pictures: chi-square with one degree of freedom where the
-    /// corners scatter independently and as much as they say.
+    /// Squared whitened residual that the best point leaves in both pictures: chi-square with one degree of freedom
+    /// where the corners scatter independently and as much as they say.
     pub chi_square: f64,
     /// Derivatives by the rig's numbers.
     pub by_rig: [Vector3<f64>; RIG_NUMBERS],
@@ -44,7 +45,8 @@ impl SpacePoint {
     }
 }
 
-/// Index of a number of the rig by its name in `calibration.json`; `None` for names of other things (the board's shape).
+/// Index of a number of the rig by its name in `calibration.json`; `None` for names of other things (the board's
+/// shape).
 pub fn rig_number(name: &str) -> Option<usize> {
     let (part, number) = name.split_once('.')?;
     let camera = |start: usize| CAMERA_NAMES.iter().position(|n| *n == number).map(|i| start + i);
@@ -56,7 +58,8 @@ pub fn rig_number(name: &str) -> Option<usize> {
     }
 }
 
-/// Triangulates; both observations carry their whiteners. `None` for parallel rays, points behind a camera, pixels without a ray.
+/// Triangulates; both observations carry their whiteners. `None` for parallel rays, points behind a camera, pixels
+/// without a ray.
 pub fn triangulate(rig: &Rig, left: &Observation, right: &Observation) -> Option<SpacePoint> {
     let (mut point, gap_mm) = between_rays(rig, &left.px, &right.px)?;
     let mut linear = Linear::at(rig, &point, left, right)?;

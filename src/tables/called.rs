@@ -1,9 +1,10 @@
-//! Joints whose names stand in cells, as recorders of ROS write a message: so many names, and as many positions, velocities and efforts.
+//! Joints whose names stand in cells, as recorders of ROS write a message: so many names, and as many positions,
+//! velocities and efforts.
 //!
-//! In: rows of cells. Out: the same without the names; the columns of numbers are called by them, and stand in one order where that of the names
-//! changes from row to row. Of columns with names, `field.name0`, `field.position0`, each numbered set of as many belongs to the joints; of columns
-//! without, the numbers right behind the names do, as a message has its positions first. What goes wrong: names that are not of the same joints in
-//! all rows name nothing.
+//! In: rows of cells. Out: the same without the names; the columns of numbers are called by them, and stand in one
+//! order where that of the names changes from row to row. Of columns with names, `field.name0`, `field.position0`, each
+//! numbered set of as many belongs to the joints; of columns without, the numbers right behind the names do, as a
+//! message has its positions first. What goes wrong: names that are not of the same joints in all rows name nothing.
 
 use std::ops::Range;
 

@@ -1,8 +1,9 @@
 //! What stands in a cell beside its number, or in place of one: a unit, a list, a name, a comment.
 //!
-//! In: rows of cells as they were told apart. Out: rows whose cells are numbers. A column of lists, `[1.0, 2.0]`, is as many columns; a column of
-//! numbers with a unit behind each has that unit in its name; lines that name each of their numbers, `A1 1.5, A2 2.5`, are rows below these names.
-//! What goes wrong: lists of different lengths, and units that differ within a column, stay as they are and are refused where they should be numbers.
+//! In: rows of cells as they were told apart. Out: rows whose cells are numbers. A column of lists, `[1.0, 2.0]`, is as
+//! many columns; a column of numbers with a unit behind each has that unit in its name; lines that name each of their
+//! numbers, `A1 1.5, A2 2.5`, are rows below these names. What goes wrong: lists of different lengths, and units that
+//! differ within a column, stay as they are and are refused where they should be numbers.
 
 use super::fields::Fields;
 use super::names::{Name, Unit, What};
@@ -66,7 +67,8 @@ fn without_comment(cells: &Fields, blanks: bool) -> Option<Fields> {
     Some(Fields::new(cells.iter().take(at).chain(last.as_deref())))
 }
 
-/// Makes columns of lists as many columns, takes units behind numbers to the names and comments away; `blanks` stand between the cells.
+/// Makes columns of lists as many columns, takes units behind numbers to the names and comments away; `blanks` stand
+/// between the cells.
 pub(super) fn plain(rows: &mut Vec<(u64, Fields)>, blanks: bool) {
     for (_, row) in rows.iter_mut() {
         if let Some(before) = without_comment(row, blanks) {
@@ -172,7 +174,8 @@ fn with_unit(cell: &str) -> Option<(String, String)> {
     (is_number(&plain) && Unit::of(unit).is_some()).then(|| (plain, unit.to_owned()))
 }
 
-/// Names for the numbers of a list: joints are counted, three numbers are a point, and so is the last column of a transform.
+/// Names for the numbers of a list: joints are counted, three numbers are a point, and so is the last column of a
+/// transform.
 fn of_list(name: &str, length: usize, transform: bool) -> Vec<String> {
     let (base, unit) = without_unit(name);
     // `T` before a transform's name says what it is.

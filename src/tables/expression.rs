@@ -1,8 +1,9 @@
 //! Numbers as formulas have them: `pi/2`, `-np.pi / 2`, `deg2rad(90)`, `135*mm`, `q2 - 90°`.
 //!
-//! In: text, and what its names stand for. Out: the number, whether it was written with pi, and whether a joint's variable is part of it, which
-//! counts as zero. What goes wrong: a name that stands for nothing, a multiple of a joint's variable or several of them, or anything that is no sum of
-//! products; there is no number then. Nor is there one where the joint counts the other way, unless that is asked for.
+//! In: text, and what its names stand for. Out: the number, whether it was written with pi, and whether a joint's
+//! variable is part of it, which counts as zero. What goes wrong: a name that stands for nothing, a multiple of a
+//! joint's variable or several of them, or anything that is no sum of products; there is no number then. Nor is there
+//! one where the joint counts the other way, unless that is asked for.
 
 use std::f64::consts::PI;
 
@@ -35,7 +36,8 @@ const VARIABLES: [&str; 5] = ["theta", "θ", "q", "th", "t"];
 /// The deepest brackets that are followed.
 const DEEPEST: usize = 20;
 
-/// What a joint's variable may be multiplied with: it stands there itself, or as degrees in radians or mm in m, or the other way.
+/// What a joint's variable may be multiplied with: it stands there itself, or as degrees in radians or mm in m, or the
+/// other way.
 const OF_ONE: [f64; 5] = [1.0, PI / 180.0, 180.0 / PI, 1e-3, 1e3];
 
 /// Rounding of such a factor, in parts of it.
@@ -179,7 +181,8 @@ impl Parser<'_> {
         })
     }
 
-    /// A function of what stands in its brackets, the first of which was read; none of a joint's variable, for which no number stands.
+    /// A function of what stands in its brackets, the first of which was read; none of a joint's variable, for which no
+    /// number stands.
     fn applied(&mut self, function: Function, depth: usize) -> Option<f64> {
         let (radians, variable) = (self.radians, std::mem::take(&mut self.variable));
         let inside = self.sum(depth + 1)?;

@@ -1,7 +1,7 @@
 //! Files of other programs that hold no rows of cells, and how their tables are exported.
 //!
-//! In: a file's bytes, or its text. Out: what it is, and a line of the program that makes a table of it. What goes wrong: a text in brackets may be
-//! a list of rows as programs write it, which is read; JSON is what parses as such.
+//! In: a file's bytes, or its text. Out: what it is, and a line of the program that makes a table of it. What goes
+//! wrong: a text in brackets may be a list of rows as programs write it, which is read; JSON is what parses as such.
 
 use camino::Utf8Path;
 use serde_json::Value;
@@ -36,7 +36,8 @@ pub(super) fn of_bytes(bytes: &[u8], path: &Utf8Path) -> Option<(&'static str, S
     bytes.starts_with(&[0x1f, 0x8b]).then(|| ("a compressed file", "unpack it first: `gunzip FILE`".to_owned()))
 }
 
-/// The line that makes a table of a JSON file: of its longest list of records, of records with names, or of a list for each column.
+/// The line that makes a table of a JSON file: of its longest list of records, of records with names, or of a list for
+/// each column.
 fn of_json(value: &Value, path: &Utf8Path) -> String {
     let (file, table) = (path.file_name().unwrap_or_default(), table_of(path));
     let loaded = format!("json.load(open('{file}'))");
@@ -140,7 +141,8 @@ fn keys_to_list(lines: &[&str]) -> Option<Vec<String>> {
     (!keys.is_empty()).then(|| keys.into_iter().map(|(_, key)| key).collect())
 }
 
-/// The name of the first matrix that OpenCV wrote, with `%d` for its number where there are several of it, and how many.
+/// The name of the first matrix that OpenCV wrote, with `%d` for its number where there are several of it, and how
+/// many.
 fn opencv_matrices(text: &str) -> Option<(String, usize)> {
     let name = |line: &str| Some(line.strip_suffix("!!opencv-matrix")?.trim().strip_suffix(':')?.to_owned());
     let names: Vec<String> = text.lines().filter_map(|line| name(line.trim_end())).collect();

@@ -1,9 +1,9 @@
 //! A file as rows of cells: which delimiter it has.
 //!
-//! The delimiter is the one with which most of the first rows have equally many cells, and of those that do equally well the one that makes
-//! most cells numbers; comma, semicolon, tab, bar and blanks in this order. Numbers may have a decimal comma, or thousands set apart. Rows of a
-//! program's list, each in brackets, are rows without them.
-//! Time and memory grow with the file's length alone.
+//! The delimiter is the one with which most of the first rows have equally many cells, and of those that do equally
+//! well the one that makes most cells numbers; comma, semicolon, tab, bar and blanks in this order. Numbers may have a
+//! decimal comma, or thousands set apart. Rows of a program's list, each in brackets, are rows without them. Time and
+//! memory grow with the file's length alone.
 
 use camino::{Utf8Path, Utf8PathBuf};
 
@@ -62,8 +62,8 @@ impl Grid {
         Grid::of(path, Source::Text(text, None), None)
     }
 
-    /// Reads a file of readings, which may be a program's: lines that hold a joint target of at least so many numbers are rows of those. Lists, units and
-    /// comments in its cells are read, and names of joints in them.
+    /// Reads a file of readings, which may be a program's: lines that hold a joint target of at least so many numbers
+    /// are rows of those. Lists, units and comments in its cells are read, and names of joints in them.
     pub fn read_with_programs(path: &Utf8Path, what: &'static str, hint: &str, joints: usize) -> Result<Grid> {
         let mut grid = Grid::of(path, source::read(path, what, hint)?, Some(joints))?;
         cells::plain(&mut grid.rows, grid.form == Form::Delimited(' '));
@@ -163,7 +163,8 @@ impl Grid {
         Ok(())
     }
 
-    /// Writes all numbers as a program reads them; `free` says that a comma may stand inside of a number without quotes around it.
+    /// Writes all numbers as a program reads them; `free` says that a comma may stand inside of a number without quotes
+    /// around it.
     fn tidy(&mut self, free: bool) {
         let style = Style::of(self.rows.iter().flat_map(|(_, row)| row.iter()), free);
         for (_, row) in &mut self.rows {
@@ -185,15 +186,16 @@ impl Grid {
     }
 }
 
-/// A list of rows as programs write it, `[[1, 2], [3, 4]]`, `data = [1 2; 3 4]` on a line each: without the brackets. `None` where most lines are
-/// none of its rows.
+/// A list of rows as programs write it, `[[1, 2], [3, 4]]`, `data = [1 2; 3 4]` on a line each: without the brackets.
+/// `None` where most lines are none of its rows.
 fn without_brackets(text: &str) -> Option<String> {
     let is_bracket = |c: char| matches!(c, '[' | ']' | '{' | '}' | '(' | ')');
     let of_numbers = |c: char| c.is_ascii_digit() || " \t\r,;.+-eE".contains(c);
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
     let is_row = |line: &str| line.chars().all(|c| is_bracket(c) || of_numbers(c));
     let rows = lines.iter().filter(|line| is_row(line));
-    // Names with units in brackets, `J1 [deg]`, close what they open and stand once; a list is opened on one line and closed on another, or on each.
+    // Names with units in brackets, `J1 [deg]`, close what they open and stand once; a list is opened on one line and
+    // closed on another, or on each.
     let closed = |line: &&&str| line.matches(['[', '{', '(']).count() == line.matches([']', '}', ')']).count();
     let bracketed = lines.iter().filter(|line| line.contains(is_bracket)).count();
     let is_list = 2 * bracketed > lines.len() || lines.iter().any(|line| !closed(&line));
@@ -269,8 +271,8 @@ fn delimiter(text: &str) -> char {
     found.map_or(',', |(d, _)| *d)
 }
 
-/// Counts lines as an editor does. The reader's own count is one short in files whose lines end in `\r\n`: it takes a record to begin
-/// between the two.
+/// Counts lines as an editor does. The reader's own count is one short in files whose lines end in `\r\n`: it takes a
+/// record to begin between the two.
 struct Lines<'a> {
     text: &'a [u8],
     at: usize,

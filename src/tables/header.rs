@@ -1,12 +1,11 @@
 //! Where the names of a table's columns stand, if there are any, and where its numbers begin.
 //!
-//! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers, or has numbers and words where the rows below it have
-//! them, is the first row of the table; the row above it has
-//! the names, one that has nothing but units below the names goes with them, and what stands above is a title. Names that count the columns,
-//! 0, 1, 2, ..., are none.
-//! A comment above the numbers whose words are none of their columns is no row of names.
-//! What goes wrong: rows of other lengths than the others, names of another count than the columns, and a second table below the first; all are
-//! refused with the line.
+//! In: a grid. Out: names, or none, and the rows below. The first row that is mostly numbers, or has numbers and words
+//! where the rows below it have them, is the first row of the table; the row above it has the names, one that has
+//! nothing but units below the names goes with them, and what stands above is a title. Names that count the columns, 0,
+//! 1, 2, ..., are none. A comment above the numbers whose words are none of their columns is no row of names. What goes
+//! wrong: rows of other lengths than the others, names of another count than the columns, and a second table below the
+//! first; all are refused with the line.
 
 use super::fields::Fields;
 use super::grid::Grid;
@@ -80,8 +79,9 @@ fn first_row(grid: &Grid, is_number: &dyn Fn(&str) -> bool) -> Option<usize> {
     (0..rows.len()).find(|&at| is_data(&rows[at].1, is_number) || is_labelled(&rows[at..], is_number))
 }
 
-/// Whether the first of these rows has numbers where most of those below it have numbers, and words where they have words, be these as many as they
-/// may: `A,Main,p1,2.5,3.5,4.5,2024-05-06 10:00:00`. What is counted or sized in names and titles is whole, or stands above words.
+/// Whether the first of these rows has numbers where most of those below it have numbers, and words where they have
+/// words, be these as many as they may: `A,Main,p1,2.5,3.5,4.5,2024-05-06 10:00:00`. What is counted or sized in names
+/// and titles is whole, or stands above words.
 fn is_labelled(rows: &[(u64, Fields)], is_number: &dyn Fn(&str) -> bool) -> bool {
     let [(_, row), below @ ..] = rows else { return false };
     let below = &below[..below.len().min(BELOW)];
@@ -178,7 +178,8 @@ fn above(grid: &Grid, mut at: usize) -> (u64, Vec<String>) {
     let filled = |cells: &[String]| cells.iter().filter(|cell| !cell.is_empty()).count();
     let twice = (1..names.len()).any(|i| !names[i].is_empty() && names[..i].contains(&names[i]));
     if at > 0 && filled(&cells(at - 1)) > 1 {
-        // A heading stands in the first of the cells that it spans. Names that stand twice are of it, and others have its unit.
+        // A heading stands in the first of the cells that it spans. Names that stand twice are of it, and others have
+        // its unit.
         let mut heading = String::new();
         let headings = cells(at - 1).into_iter().chain(std::iter::repeat(String::new()));
         for (name, above) in names.iter_mut().zip(headings) {
@@ -242,7 +243,8 @@ fn joined(names: &[String], belongs: impl Fn(&str, &str) -> bool) -> Vec<String>
     joined
 }
 
-/// Names, one a column: without a comment's mark, with units put back to the names that blanks cut off, with one for numbers of rows.
+/// Names, one a column: without a comment's mark, with units put back to the names that blanks cut off, with one for
+/// numbers of rows.
 fn fitted(grid: &Grid, line: u64, mut names: Vec<String>, rows: &[(u64, Fields)], width: usize) -> Result<Vec<String>> {
     if names.first().is_some_and(|name| matches!(name.as_str(), "#" | "%" | "//")) {
         names.remove(0);

@@ -1,8 +1,9 @@
-//! Lines of a log that name their values: `12:30:05 q=[0.1, ...] p=[0.4, 0.2, 0.3]`, or each value in a line of its own.
+//! Lines of a log that name their values: `12:30:05 q=[0.1, ...] p=[0.4, 0.2, 0.3]`, or each value in a line of its
+//! own.
 //!
-//! In: a text. Out: a row of the names, and one each time that they all have come; the time and what else stands before and between them is left
-//! alone, as are lines without a list. What goes wrong: other names somewhere, or in another order, and names that are of no more than one list,
-//! as in the calls of a program, make it no such log.
+//! In: a text. Out: a row of the names, and one each time that they all have come; the time and what else stands before
+//! and between them is left alone, as are lines without a list. What goes wrong: other names somewhere, or in another
+//! order, and names that are of no more than one list, as in the calls of a program, make it no such log.
 
 use super::cells::list;
 use super::fields::Fields;

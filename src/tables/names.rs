@@ -1,9 +1,10 @@
-//! Names of columns as what they mean: joints, coordinates, distances, with units and with whether they were measured or commanded.
+//! Names of columns as what they mean: joints, coordinates, distances, with units and with whether they were measured
+//! or commanded.
 //!
-//! In: a name in any case, with blanks, underscores, units in brackets or behind. Out: a [`Name`]. Words that say what a number is not (torques,
-//! velocities, errors, uncertainties, orientations) make it [`What::Other`]; words that say that a point was sent to the robot or computed, not
-//! measured, make it commanded.
-//! What goes wrong: `x y z` alone may be either, and a set of joints is one only where it is complete; who reads the table decides.
+//! In: a name in any case, with blanks, underscores, units in brackets or behind. Out: a [`Name`]. Words that say what
+//! a number is not (torques, velocities, errors, uncertainties, orientations) make it [`What::Other`]; words that say
+//! that a point was sent to the robot or computed, not measured, make it commanded. What goes wrong: `x y z` alone may
+//! be either, and a set of joints is one only where it is complete; who reads the table decides.
 
 /// A unit of a joint or of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,7 +86,8 @@ pub struct Name {
     pub unit: Option<Unit>,
     /// What else the name says, to tell one set of columns from another.
     pub key: Vec<String>,
-    /// Whether the name says that it was measured (`Some(true)`), or that it was commanded, computed or is something else.
+    /// Whether the name says that it was measured (`Some(true)`), or that it was commanded, computed or is something
+    /// else.
     pub measured: Option<bool>,
 }
 
@@ -227,8 +229,8 @@ fn without(words: &[String], out: &[usize]) -> Vec<String> {
     words.iter().enumerate().filter(|(i, _)| !out.contains(i)).map(|(_, word)| word.clone()).collect()
 }
 
-/// `joint 3`, `q3`, `theta_3_actual`, `fr3_joint3`: a word for joints and the only number behind it. The word stays in the key: `q` and `theta` are
-/// two sets.
+/// `joint 3`, `q3`, `theta_3_actual`, `fr3_joint3`: a word for joints and the only number behind it. The word stays in
+/// the key: `q` and `theta` are two sets.
 fn joint(words: &[String]) -> Option<(What, Vec<String>)> {
     let counted = |at: usize| {
         let mut numbers = (at + 1..words.len()).filter(|&i| words[i].parse::<usize>().is_ok());

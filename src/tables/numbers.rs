@@ -1,9 +1,10 @@
 //! Numbers as people write them: a decimal comma, thousands set apart, a minus sign or blanks as typesetters have them.
 //!
-//! In: the cells of a whole file. Out: the same cells, those that are numbers written as a program reads them. What a comma or a point means is
-//! decided once for the file, by cells that allow one reading alone: `1,487.1` and `1,234,567` set thousands apart by commas, `1.487,1` by
-//! points, and a comma before other than three digits is a decimal one. What goes wrong: a file that holds cells of both kinds keeps them as they
-//! are, and is refused where they should be numbers.
+//! In: the cells of a whole file. Out: the same cells, those that are numbers written as a program reads them. What a
+//! comma or a point means is decided once for the file, by cells that allow one reading alone: `1,487.1` and
+//! `1,234,567` set thousands apart by commas, `1.487,1` by points, and a comma before other than three digits is a
+//! decimal one. What goes wrong: a file that holds cells of both kinds keeps them as they are, and is refused where
+//! they should be numbers.
 
 /// What separates in the numbers of a file.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -66,7 +67,8 @@ pub(super) fn is_number(text: &str) -> bool {
     text.starts_with(|c: char| c.is_ascii_digit() || matches!(c, '+' | '-' | '.')) && text.parse::<f64>().is_ok()
 }
 
-/// Without blanks between digits and apostrophes that set thousands apart, with a plain minus sign and an exponent's `e` for Fortran's `D`.
+/// Without blanks between digits and apostrophes that set thousands apart, with a plain minus sign and an exponent's
+/// `e` for Fortran's `D`.
 fn bare(cell: &str) -> String {
     let plain = cell.trim().replace(['\u{a0}', '\u{202f}', '\u{2009}', '\u{2007}'], "").replace('\u{2212}', "-");
     if plain.contains(' ') || plain.contains('\'') || plain.contains('\u{2019}') {
@@ -79,7 +81,8 @@ fn bare(cell: &str) -> String {
     if of_fortran != plain && is_number(&of_fortran) { of_fortran } else { plain }
 }
 
-/// A number whose digits are set apart in threes, without what sets them apart and with its decimals as they are but for the point.
+/// A number whose digits are set apart in threes, without what sets them apart and with its decimals as they are but
+/// for the point.
 fn ungrouped(cell: &str, by: char, decimal: char) -> Option<String> {
     let (sign, rest) = cell.split_at(usize::from(cell.starts_with(['+', '-'])));
     let (whole, decimals) = rest.split_once(decimal).map_or((rest, None), |(whole, behind)| (whole, Some(behind)));

@@ -1,11 +1,10 @@
 //! Joint targets of a robot program as rows of numbers.
 //!
-//! Programs in the makers' languages are read as `compensate` reads them; of any other text each line counts that holds a list of numbers in
-//! brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its lines do, or
-//! one of five where each has a word beside the list.
-//! Lists in calls of different names are no targets of one kind.
-//! What a maker's program calls its targets stands behind their readings, where each has a name of its own.
-//! A list is a row as it stands; numbers beyond the joints are those of axes that the robot does not have.
+//! Programs in the makers' languages are read as `compensate` reads them; of any other text each line counts that holds
+//! a list of numbers in brackets, `j:{1.0,2.0,...}`, `Angles(1.0, 2.0, ...)`, `[1.0, 2.0, ...]`, as long as most of its
+//! lines do, or one of five where each has a word beside the list. Lists in calls of different names are no targets of
+//! one kind. What a maker's program calls its targets stands behind their readings, where each has a name of its own. A
+//! list is a row as it stands; numbers beyond the joints are those of axes that the robot does not have.
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -1,8 +1,8 @@
 //! Records of JSON as rows: an object a line, or a list of objects.
 //!
-//! In: a text. Out: a row of the names, and one for each object. A value in an object within has the names of both, `point.x`; a list is a cell.
-//! What goes wrong: a text that is anything else, a lone object, objects of fewer numbers than a point has, and objects that hardly share a name
-//! are no table.
+//! In: a text. Out: a row of the names, and one for each object. A value in an object within has the names of both,
+//! `point.x`; a list is a cell. What goes wrong: a text that is anything else, a lone object, objects of fewer numbers
+//! than a point has, and objects that hardly share a name are no table.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;

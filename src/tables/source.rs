@@ -1,8 +1,9 @@
 //! A file's bytes as text or as the cells of a spreadsheet.
 //!
-//! In: a path, for spreadsheets with `#SHEET` behind it. Out: text decoded from UTF-8, UTF-16 or Latin-1 (as Windows has it, code page
-//! 1252), or cells, those of JSON's records included. What goes wrong: files of MATLAB, NumPy and the like are no text; the message says how to export them. A formula whose value the
-//! spreadsheet does not hold is refused with its cell.
+//! In: a path, for spreadsheets with `#SHEET` behind it. Out: text decoded from UTF-8, UTF-16 or Latin-1 (as Windows
+//! has it, code page 1252), or cells, those of JSON's records included. What goes wrong: files of MATLAB, NumPy and the
+//! like are no text; the message says how to export them. A formula whose value the spreadsheet does not hold is
+//! refused with its cell.
 
 use std::io::{Cursor, Read};
 

@@ -1,4 +1,5 @@
-//! What a run's own words advise against is said by every command that uses its files: a robot that `identify` said not to use.
+//! What a run's own words advise against is said by every command that uses its files: a robot that `identify` said not
+//! to use.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -45,7 +46,8 @@ fn advise(at: &Path, advice: &str) {
         .unwrap();
 }
 
-/// Each command that uses the robot, and the status that it has where nothing speaks against it; then what it says and with which status.
+/// Each command that uses the robot, and the status that it has where nothing speaks against it; then what it says and
+/// with which status.
 fn used(at: &Path) -> Vec<(&'static str, i32, String)> {
     let rows = std::fs::read_to_string(at.join("truth/measurements.csv")).unwrap();
     let pose: Vec<&str> = rows.lines().nth(1).unwrap().split(',').collect();
@@ -105,7 +107,8 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
     }
 }
 
-/// A file in which one length is 7 mm off, as of a sister model, fits as well as the right one; targets that are compensated from it would not.
+/// A file in which one length is 7 mm off, as of a sister model, fits as well as the right one; targets that are
+/// compensated from it would not.
 #[test]
 #[ignore = "slow"]
 fn a_length_that_nobody_builds_so_is_named_by_whatever_uses_the_robot() {
@@ -229,7 +232,8 @@ fn verify_says_that_a_robot_was_fitted_to_the_rows_and_what_its_columns_are() {
     assert_eq!(messages.matches("was fitted to").count(), 1, "{messages}");
 }
 
-/// A table of joints, deg, and points, m, of one placement without names; a file with the rows of the first group alone; a rig.
+/// A table of joints, deg, and points, m, of one placement without names; a file with the rows of the first group
+/// alone; a rig.
 fn tables(at: &Path) {
     let made = ["simulate", "--points-only", "--samples", "40", "--verify", "12", "--seed", "4", "--out", "."];
     assert_eq!(stereocal(at, &made).status.code(), Some(0));

@@ -344,7 +344,8 @@ fn robots_that_are_not_one_arm_are_refused_and_one_robot_twice_is_said() {
     let folder = workplace();
     let (nominal, _) = with_tools(folder.path(), [0.0; 3], [0.0; 3]);
     let write = |name: &str, robot: &Robot| std::fs::write(folder.path().join(name), file::to_toml(robot)).unwrap();
-    // Another arm of as many joints, links and twists beyond what robots are built to, a joint that is counted the other way.
+    // Another arm of as many joints, links and twists beyond what robots are built to, a joint that is counted the
+    // other way.
     let mut changed: Vec<(Robot, &str)> = vec![(catalogue::robot("abb-irb120").unwrap(), "d_1 ")];
     for (size, part) in [(15.0, "a_2 +15.0 mm"), (80.0, "a_2 +80.0 mm")] {
         let mut robot = nominal.clone();

@@ -1,5 +1,6 @@
-//! Corners against the simulator's truth: how far off they may be, on copies reduced by 1, 2 and 5, under what cameras and benches do to
-//! pictures. No corner may be off by many of its sigmas, whatever was done: a missing corner is better than a shifted one.
+//! Corners against the simulator's truth: how far off they may be, on copies reduced by 1, 2 and 5, under what cameras
+//! and benches do to pictures. No corner may be off by many of its sigmas, whatever was done: a missing corner is
+//! better than a shifted one.
 
 use image::codecs::jpeg::JpegEncoder;
 use stereocal::imaging::image::{Image, Picture, decode};
@@ -9,7 +10,8 @@ use crate::shot::{Deviations, Setup, Shot};
 
 /// Sides of the pictures: detection looks at copies reduced by 1, 2 and 5.
 const SIZES: [u32; 3] = [1280, 2200, 5120];
-/// Largest deviation in sigmas. Of 1200 corners with normal deviations the largest is off by 4; blur that is no Gaussian adds some.
+/// Largest deviation in sigmas. Of 1200 corners with normal deviations the largest is off by 4; blur that is no
+/// Gaussian adds some.
 const MOST_SIGMAS: f64 = 7.0;
 
 fn shot(size: u32, squares: &'static str, square_mm: f64) -> Shot {

@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use crate::run::{Files, files_below, stderr, stdout, stereocal, with_files, workplace};
 
-/// Shifts the right pictures' corners of a `corners.csv` along x by what a turn of the right camera by so many rad does to them, to first order.
+/// Shifts the right pictures' corners of a `corners.csv` along x by what a turn of the right camera by so many rad does
+/// to them, to first order.
 fn turned(folder: &Path, from: &str, to: &str, focal_px: f64, rad: f64) {
     let text = std::fs::read_to_string(folder.join(from)).unwrap();
     let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
@@ -256,7 +257,8 @@ fn a_check_says_what_it_judged_and_by_what() {
     assert!(evidence.contains("pairs with poses of their own"), "the names in the file are the contract's");
 }
 
-/// Of pictures that the calibration was made of, under other names, a check says nothing: they are left out where the others are enough.
+/// Of pictures that the calibration was made of, under other names, a check says nothing: they are left out where the
+/// others are enough.
 #[test]
 #[ignore = "slow"]
 fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {

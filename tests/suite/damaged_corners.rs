@@ -1,5 +1,6 @@
-//! Boards as people photograph them: sharpened, clipped, glary, compressed, cut, held by fingers. Each kind is planted in a dozen pictures whose
-//! true corners are known: the board must be read in all, nine of ten corners must have a covariance, and the covariance must be true.
+//! Boards as people photograph them: sharpened, clipped, glary, compressed, cut, held by fingers. Each kind is planted
+//! in a dozen pictures whose true corners are known: the board must be read in all, nine of ten corners must have a
+//! covariance, and the covariance must be true.
 
 use crate::planted_faults::matrix::picture_faults::{PictureFault, Shares};
 use image::codecs::jpeg::JpegEncoder;
@@ -253,8 +254,9 @@ fn outcome(kind: &Kind, first: usize) -> Outcome {
     }
 }
 
-/// The least chi-squared of a kind: where covariances are too large. What stray light or an overshoot does to one arm it does to the opposite one the
-/// other way round, so that it cancels in the corner, which the arms' scatter does not tell.
+/// The least chi-squared of a kind: where covariances are too large. What stray light or an overshoot does to one arm
+/// it does to the opposite one the other way round, so that it cancels in the corner, which the arms' scatter does not
+/// tell.
 fn least_chi2(kind: &Kind) -> f64 {
     match kind.name {
         "glare" | "glare, JPEG 75" | "sharpened much" => 0.45,

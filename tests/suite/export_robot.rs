@@ -1,4 +1,5 @@
-//! `export robot` as a command: the maker's description corrected, the formats, and what is said of terms that they cannot carry.
+//! `export robot` as a command: the maker's description corrected, the formats, and what is said of terms that they
+//! cannot carry.
 
 use std::path::Path;
 

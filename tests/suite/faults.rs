@@ -1,5 +1,6 @@
-//! What goes wrong around the program: a stderr or stdout that cannot be written, a full disk, folders and files without
-//! permission, a writer that is killed, two runs in one folder. No result is lost, none is half written, and it is said.
+//! What goes wrong around the program: a stderr or stdout that cannot be written, a full disk, folders and files
+//! without permission, a writer that is killed, two runs in one folder. No result is lost, none is half written, and it
+//! is said.
 
 use std::collections::BTreeMap;
 use std::path::Path;

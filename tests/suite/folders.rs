@@ -1,4 +1,5 @@
-//! Folders of pictures as people have them, through the commands: what is taken, what is refused, and the same results whatever the names.
+//! Folders of pictures as people have them, through the commands: what is taken, what is refused, and the same results
+//! whatever the names.
 
 use std::path::Path;
 
@@ -11,7 +12,8 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
     stderr(&output)
 }
 
-/// A small world, its pictures also under other names: `cams/cam1/b0001.png` with `cams/cam2/a0001.png`, both views in each of `wide/` and `high/`.
+/// A small world, its pictures also under other names: `cams/cam1/b0001.png` with `cams/cam2/a0001.png`, both views in
+/// each of `wide/` and `high/`.
 fn world() -> tempfile::TempDir {
     let folder = workplace();
     let root = folder.path();
@@ -98,8 +100,8 @@ fn measure_finds_the_poses_beside_two_folders() {
     few_pairs_give_way_where_more_are_needed(root);
 }
 
-/// Of these pictures, which are empty, only what is taken is looked at: four pairs calibrate, three do with known lenses, two say whether a rig still
-/// holds, and measure takes any number.
+/// Of these pictures, which are empty, only what is taken is looked at: four pairs calibrate, three do with known
+/// lenses, two say whether a rig still holds, and measure takes any number.
 fn few_pairs_give_way_where_more_are_needed(root: &Path) {
     let pairs = |folder: &str, count: usize| {
         std::fs::create_dir_all(root.join(folder)).unwrap();

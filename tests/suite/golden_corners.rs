@@ -1,10 +1,11 @@
-//! Golden pictures: what imaging finds in clean and in damaged pictures, as the program itself once wrote it (`golden_corners.txt`,
-//! `golden_damaged.txt`).
+//! Golden pictures: what imaging finds in clean and in damaged pictures, as the program itself once wrote it
+//! (`golden_corners.txt`, `golden_damaged.txt`).
 //!
-//! Corners of clean pictures are what everything else builds on; a change that is meant for damaged pictures must not move them. The text has
-//! every bit of every number: `STEREOCAL_GOLDEN=/tmp` writes the present ones, which are the same bytes on the machine that wrote
-//! the golden ones. The test itself allows a fiftieth of a sigma: the system's sine, cosine and exponential may differ in their last bit from
-//! processor to processor, which now and then rounds a grey value of a rendered picture the other way.
+//! Corners of clean pictures are what everything else builds on; a change that is meant for damaged pictures must not
+//! move them. The text has every bit of every number: `STEREOCAL_GOLDEN=/tmp` writes the present ones, which are the
+//! same bytes on the machine that wrote the golden ones. The test itself allows a fiftieth of a sigma: the system's
+//! sine, cosine and exponential may differ in their last bit from processor to processor, which now and then rounds a
+//! grey value of a rendered picture the other way.
 
 use std::fmt::Write;
 
@@ -14,7 +15,8 @@ use stereocal::imaging::lattice::Lattice;
 use crate::damaged_corners::small_picture;
 use crate::shot::Setup;
 
-/// Most by which a place may differ from the golden one, as a share of its standard deviation, and a covariance, as a share of itself.
+/// Most by which a place may differ from the golden one, as a share of its standard deviation, and a covariance, as a
+/// share of itself.
 const MOST_SIGMAS: f64 = 0.02;
 
 /// Boards, sizes, blurs and noise of clean pictures.

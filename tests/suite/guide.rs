@@ -1,5 +1,5 @@
-//! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder. Those of the page `day` are
-//! the run that the READMEs show.
+//! The guide's pages: the commands in their `sh` blocks are run one after the other in one clean folder. Those of the
+//! page `day` are the run that the READMEs show.
 
 use std::collections::BTreeSet;
 

@@ -76,7 +76,8 @@ fn stands_in_the_guide(name: &str, picture: &GrayImage) {
     assert!(far == 0, "{name}: {far} pixels differ; STEREOCAL_REFRESH=1 writes the picture anew");
 }
 
-/// Corners with a covariance, and how far they are off, RMS of a coordinate in px; the reason where the board is not read.
+/// Corners with a covariance, and how far they are off, RMS of a coordinate in px; the reason where the board is not
+/// read.
 fn read((shot, picture): &(Shot, GrayImage)) -> Result<(usize, f64), String> {
     let (width, height) = (picture.width() as usize, picture.height() as usize);
     let picture = Picture::from(Image { width, height, pixels: picture.as_raw().clone() });

@@ -386,7 +386,8 @@ fn true_turns(folder: &Path) -> Turns {
 /// Three targets round the mark point, mm, and what a reading of each is off by at a pose.
 const TARGETS_MM: [[f64; 3]; 3] = [[50.0, 0.0, 0.0], [-20.0, 40.0, 10.0], [-30.0, -40.0, -10.0]];
 
-/// A row for each of the targets instead of one for their mean, with neither covariances nor orientations; `turns` are the target's by pose.
+/// A row for each of the targets instead of one for their mean, with neither covariances nor orientations; `turns` are
+/// the target's by pose.
 fn of_targets(fields: &[String], names: [&str; 3], line: usize, turns: &Turns) -> Vec<String> {
     let role = fields.iter().position(|f| f == "center" || f == "sample" || f == "verify").expect("a role");
     let number = |k: usize| fields[role + 7 + k].parse::<f64>().expect("a number");

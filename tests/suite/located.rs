@@ -132,7 +132,8 @@ fn an_instrument_that_stands_elsewhere_is_taken_from_its_new_placement_on() {
         ["identify", "--measurements", "truth/measurements.csv", "--method", "trust-region", "--extensions", "none"];
     let found = stereocal(at, &[&found[..], &["--robot", "robot.toml", "--force"]].concat());
     assert_eq!(found.status.code(), Some(0), "{}{}", stdout(&found), stderr(&found));
-    // New points of the first placement, which differ from those of the identification by some micrometres, turned and shifted.
+    // New points of the first placement, which differ from those of the identification by some micrometres, turned and
+    // shifted.
     let mut day = rows(at)[..20].to_vec();
     for (k, row) in day.iter_mut().enumerate() {
         let (x, y) = (row[6] + 0.003 * (k as f64).sin(), row[7] + 0.003 * (1.7 * k as f64).cos());

@@ -1,4 +1,5 @@
-//! `measure` as its users meet it: what it says of a rig or a target that is another, of bad poses, and of pictures that arrive late.
+//! `measure` as its users meet it: what it says of a rig or a target that is another, of bad poses, and of pictures
+//! that arrive late.
 
 use std::path::Path;
 use std::sync::LazyLock;
@@ -94,7 +95,8 @@ fn names_that_a_spreadsheet_took_zeros_from_find_their_pictures() {
     let list = world.join("poses/poses.csv");
     let names = column(&list, "pose");
     let points = column(&world.join("out/measurements.csv"), "x_mm");
-    // Pictures 001, 002, ...; the list has 1, 2, ... as a spreadsheet writes them, and one pose that nobody photographed.
+    // Pictures 001, 002, ...; the list has 1, 2, ... as a spreadsheet writes them, and one pose that nobody
+    // photographed.
     for (k, name) in names.iter().enumerate() {
         for side in ["left", "right"] {
             let at = |name: &str| world.join(format!("poses/{side}/{name}.png"));

@@ -1,4 +1,5 @@
-//! Tables that are not what they seem to be, judged by a robot that is known: what is said of them, with which figures and which status.
+//! Tables that are not what they seem to be, judged by a robot that is known: what is said of them, with which figures
+//! and which status.
 
 use std::path::Path;
 use std::sync::LazyLock;

@@ -31,7 +31,8 @@ fn sharpening_leaves_even_grey_and_overshoots_at_an_edge() {
     picture.suffer(&PictureFault::Sharpened { amount: 1.0, radius_px: 1.0 }, 1, 0);
     let row = &picture.values[160..200];
     assert!((row[5] - 0.3).abs() < 1e-6 && (row[35] - 0.6).abs() < 1e-6);
-    // The first pixel beyond the edge keeps what a Gaussian of one px has beyond half a px of it: three tenths of the step.
+    // The first pixel beyond the edge keeps what a Gaussian of one px has beyond half a px of it: three tenths of the
+    // step.
     assert!((row[20] - 0.6 - 0.09).abs() < 0.02 && (row[19] + row[20] - 0.9).abs() < 1e-6, "{row:?}");
 }
 

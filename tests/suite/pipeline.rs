@@ -1,5 +1,5 @@
-//! The whole way of the data on a simulated world: `simulate`, `camera-check`, `measure`, `identify`, and the files of the contract read
-//! back. [`crate::guide`] runs the commands.
+//! The whole way of the data on a simulated world: `simulate`, `camera-check`, `measure`, `identify`, and the files of
+//! the contract read back. [`crate::guide`] runs the commands.
 
 use std::path::Path;
 
@@ -29,7 +29,8 @@ fn header(path: &Path) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-/// What the commands of the guide's page `day` wrote: pictures of a simulated world to corrected kinematics, all methods, no flags.
+/// What the commands of the guide's page `day` wrote: pictures of a simulated world to corrected kinematics, all
+/// methods, no flags.
 pub fn as_in_the_contract(world: &Path) {
     let check = json(&world.join("out/camera-check.json"));
     assert_eq!(check.pointer("/passed"), Some(&Value::Bool(true)));
@@ -68,7 +69,8 @@ pub fn as_in_the_contract(world: &Path) {
     another_calibration_is_noticed(world);
 }
 
-/// The robot's file says which calibration it came from, and measurements that were made with another one are warned of.
+/// The robot's file says which calibration it came from, and measurements that were made with another one are warned
+/// of.
 fn another_calibration_is_noticed(world: &Path) {
     let identified = json(&world.join("out/identification.json"));
     let inputs = identified.pointer("/provenance/measured_by/inputs").and_then(Value::as_array).expect("inputs");

@@ -1,4 +1,5 @@
-//! Where the cameras stand: what `identify` and `locate` write of it, and what readers of other programs make of the exports.
+//! Where the cameras stand: what `identify` and `locate` write of it, and what readers of other programs make of the
+//! exports.
 
 use std::process::Command;
 use std::sync::LazyLock;
@@ -293,7 +294,8 @@ fn ten_poses_say_whether_the_robot_is_still_the_same() {
     let all = format!("this robot was identified from {0} of these {0} rows", old.len());
     assert!(stderr(&own).contains(&all) && page().contains(&all), "{}", stderr(&own));
     assert!(!page().contains("new poses against"));
-    // Rows that the robot was identified from, under other names: alone they say nothing, among new ones they are left out.
+    // Rows that the robot was identified from, under other names: alone they say nothing, among new ones they are left
+    // out.
     let renamed: Vec<String> = old
         .iter()
         .take(12)

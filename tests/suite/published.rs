@@ -43,7 +43,8 @@ fn matlabs_calibration_of_duodic() {
     // MATLAB's corners all weigh alike and nothing is expected of lenses: a fifth of its own standard deviations.
     assert!(off.component_div(&Vector3::new(0.084, 0.028, 0.309)).amax() < 0.2, "{off}");
     let ratio = translation_sigmas(&rig).component_div(&Vector3::new(0.083768, 0.028499, 0.309406));
-    // MATLAB's know of the corners' noise alone. Richer lenses, which the corners ask for, move T_z by fifteen of them: that is in ours.
+    // MATLAB's know of the corners' noise alone. Richer lenses, which the corners ask for, move T_z by fifteen of them:
+    // that is in ours.
     assert!(ratio.iter().all(|r| *r > 0.9) && ratio.z > 5.0, "{ratio}");
     let worst = worst_step_mm(&rig, &shared("stereo/duodic_corners/rbm_points.csv").unwrap());
     assert!(worst <= 0.0037, "{worst}");
@@ -53,8 +54,8 @@ fn matlabs_calibration_of_duodic() {
     assert!((rich.right_from_left.translation.vector.z - rig.right_from_left.translation.vector.z).abs() > 3.0);
     assert!(check["evidence"].as_array().is_some_and(|all| all.len() > 10), "{check}");
     assert!(!said.contains("radial2"), "{said}");
-    // This board's crossings are off by 0.02 mm. What a fifth term gains is no more than that print would let it gain, so that four are kept;
-    // they miss the stage by 0.2 um more.
+    // This board's crossings are off by 0.02 mm. What a fifth term gains is no more than that print would let it gain,
+    // so that four are kept; they miss the stage by 0.2 um more.
     let worst = worst_step_mm(&rich, &shared("stereo/duodic_corners/rbm_points.csv").unwrap());
     assert!(worst <= 0.0040, "{worst}");
 }

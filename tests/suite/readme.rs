@@ -1,7 +1,8 @@
 //! The READMEs: both show the run that the program prints, with the same figures, and stay short.
 //!
 //! A block of the run holds, behind each command, the first lines of what it prints, and `...` where more follows. With
-//! `STEREOCAL_REFRESH=1` the test writes as many lines anew as stand there; to show more or fewer, add or delete some first.
+//! `STEREOCAL_REFRESH=1` the test writes as many lines anew as stand there; to show more or fewer, add or delete some
+//! first.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +11,8 @@ use crate::run::refreshes;
 const FILES: [&str; 2] = ["README.md", "README.zh.md"];
 /// All words of README.md, as `wc -w` counts.
 const MOST_WORDS: usize = 1200;
-/// Sums are rounded otherwise with and without fused multiply-add: the last digit shown may be another one, units of it.
+/// Sums are rounded otherwise with and without fused multiply-add: the last digit shown may be another one, units of
+/// it.
 const LAST_DIGIT: f64 = 1.0;
 
 /// What a command printed on stdout.
@@ -154,7 +156,8 @@ fn the_demo_runs_what_the_readmes_show() {
     }
 }
 
-/// Numbers of the sections behind the run. The languages order some sentences otherwise, so that the numbers are compared as a set.
+/// Numbers of the sections behind the run. The languages order some sentences otherwise, so that the numbers are
+/// compared as a set.
 #[test]
 fn both_languages_state_the_same_figures() {
     let figures = |file: &str| {

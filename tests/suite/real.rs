@@ -46,8 +46,8 @@ fn a_board_that_looks_the_same_after_half_a_turn() {
 
 #[test]
 fn a_board_that_is_not_as_wide_as_said_is_named() {
-    // With the ratio of width and height free, a bundle leaves two thirds of the residuals and finds square pixels in both cameras (fx / fy 1.000);
-    // with the stated squares .990.
+    // With the ratio of width and height free, a bundle leaves two thirds of the residuals and finds square pixels in
+    // both cameras (fx / fy 1.000); with the stated squares .990.
     let Some((check, _, _)) = camera_check("public/zhou2", "11x7", "25") else { return };
     let findings = check["findings"].as_array().unwrap();
     let [board] = findings.as_slice() else { panic!("{findings:?}") };

@@ -111,7 +111,8 @@ fn corresponding_corners_stand_on_one_row() {
         untrusted.status.code() == Some(0)
             && stderr(&untrusted).contains("to what its lengths can be trusted is not known")
     );
-    // What is out of tolerance, whatever the uncertainty, makes nothing that states no uncertainty without a word in the status.
+    // What is out of tolerance, whatever the uncertainty, makes nothing that states no uncertainty without a word in
+    // the status.
     doubted["check"]["verdict"] = "fail".into();
     std::fs::write(folder.path().join("failed.json"), doubted.to_string()).unwrap();
     for made in [&["rectify", "one"][..], &["export", "calibration", "--format", "ros"]] {

@@ -41,7 +41,8 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
     }
 }
 
-/// Error and uncertainty are those of one length, in the record, on the page to sign and on that of the check; the rig comes first there.
+/// Error and uncertainty are those of one length, in the record, on the page to sign and on that of the check; the rig
+/// comes first there.
 fn what_is_judged_adds_up(world: &Path, report: &str) {
     let check: serde_json::Value =
         serde_json::from_str(&std::fs::read_to_string(world.join("out/camera-check.json")).unwrap()).unwrap();

@@ -1,4 +1,5 @@
-//! OpenCV's grids of tags from picture to length: how far black has spread is found, whatever it is, and lengths allow for it.
+//! OpenCV's grids of tags from picture to length: how far black has spread is found, whatever it is, and lengths allow
+//! for it.
 
 use crate::run::{stderr, stdout, stereocal, workplace};
 
@@ -33,7 +34,8 @@ fn the_spread_of_black_is_found_and_moves_no_length() {
             t.iter().map(|v| v.as_f64().unwrap().powi(2)).sum::<f64>().sqrt()
         };
         baselines.push(baseline(&found) / baseline(&truth) - 1.0);
-        // The first corner is the upper left one of the tag that OpenCV calls 0: its fourth, counted from the lower left.
+        // The first corner is the upper left one of the tag that OpenCV calls 0: its fourth, counted from the lower
+        // left.
         let corners = std::fs::read_to_string(folder.path().join("out/corners.csv")).unwrap();
         assert!(corners.lines().any(|line| line.contains(",0,0,") && line.ends_with(",3")), "{corners}");
     }

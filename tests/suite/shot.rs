@@ -1,4 +1,5 @@
-//! One picture of a board by the simulator, with the true places of its corners, and how far off the corners are that imaging finds in it.
+//! One picture of a board by the simulator, with the true places of its corners, and how far off the corners are that
+//! imaging finds in it.
 
 use nalgebra::{Point2, Vector3};
 use stereocal::geometry::transform;

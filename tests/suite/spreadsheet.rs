@@ -1,6 +1,8 @@
-//! The least workbook that a spreadsheet program opens, for tests of reading one: parts stored in a ZIP without compression.
+//! The least workbook that a spreadsheet program opens, for tests of reading one: parts stored in a ZIP without
+//! compression.
 
-/// A workbook of these sheets, each from a text with commas; a cell that begins with `=` is a formula without its value.
+/// A workbook of these sheets, each from a text with commas; a cell that begins with `=` is a formula without its
+/// value.
 pub fn xlsx(sheets: &[(&str, &str)]) -> Vec<u8> {
     let spreadsheetml = "http://schemas.openxmlformats.org/spreadsheetml/2006/main";
     let office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships";

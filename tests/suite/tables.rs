@@ -1,5 +1,5 @@
-//! Tables as people have them: one robot in every form gives the same rows, what was taken is said, and what stays open is refused with what
-//! settles it.
+//! Tables as people have them: one robot in every form gives the same rows, what was taken is said, and what stays open
+//! is refused with what settles it.
 
 use std::fmt::Write as _;
 use std::path::Path;

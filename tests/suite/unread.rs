@@ -1,4 +1,5 @@
-//! Tables whose rows are not all measurements: failed readings, rows to verify that were fitted, rows without a group, and a mean below.
+//! Tables whose rows are not all measurements: failed readings, rows to verify that were fitted, rows without a group,
+//! and a mean below.
 
 use std::path::Path;
 

@@ -178,7 +178,8 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
     Ok(out)
 }
 
-/// The check board, as it was printed and as large as its temperature makes it; what a caliper leaves uncertain of it, mm.
+/// The check board, as it was printed and as large as its temperature makes it; what a caliper leaves uncertain of it,
+/// mm.
 fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Result<(Board, Option<f64>)> {
     let squares = squares(args, pairing)?;
     let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
@@ -295,7 +296,8 @@ fn hashes(pairs: &[PairFiles]) -> impl Iterator<Item = String> {
     pairs.iter().flat_map(|pair| [&pair.left, &pair.right]).filter_map(|path| hash_of_picture(path))
 }
 
-/// Which of the pairs were among those from which the lenses of `--intrinsics` are known; all where the whole file of corners was.
+/// Which of the pairs were among those from which the lenses of `--intrinsics` are known; all where the whole file of
+/// corners was.
 fn pairs_of_lenses(args: &CameraCheck, pairing: Option<&Pairing>, out: &OutDir) -> LensPairs {
     let files = || args.intrinsics.iter().map(|lens| lens.path.as_path());
     let Some(pairing) = pairing else {

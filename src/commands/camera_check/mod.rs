@@ -1,4 +1,5 @@
-//! `stereocal camera-check`: a rig from pictures of a board, or, with `--against`, whether one that was calibrated still holds.
+//! `stereocal camera-check`: a rig from pictures of a board, or, with `--against`, whether one that was calibrated
+//! still holds.
 
 mod calibrate;
 mod recheck;

@@ -57,7 +57,8 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
     let mut found = recheck::recheck(&before, &corners)?;
-    // As of a change, what moves a length by less is nothing to act on; and what the calibration's own pairs scatter by is in its uncertainty.
+    // As of a change, what moves a length by less is nothing to act on; and what the calibration's own pairs scatter by
+    // is in its uncertainty.
     let all_own = args.corners.is_some() && whole.is_some();
     let is_own = |stray: &recheck::Stray| all_own || own.pairs.contains(&stray.pair);
     found.strays.retain(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm && !is_own(stray));
@@ -107,7 +108,8 @@ struct Own {
 }
 
 impl Own {
-    /// Takes the pairs of which a picture is one of the calibration's out where the others are enough; those of which only one is where any others are.
+    /// Takes the pairs of which a picture is one of the calibration's out where the others are enough; those of which
+    /// only one is where any others are.
     fn among(pairing: &mut Pairing, calibration: &Utf8Path) -> Own {
         let known = Provenance::pictures_of(calibration);
         let of = pairing.pairs.len();
@@ -185,8 +187,8 @@ mod tests {
     use super::*;
     use crate::files::temporary_folder;
 
-    /// The pairs of these names that are compared with a calibration of pairs a, b and c, and what is said: each has the left and the right picture of
-    /// the letters behind it.
+    /// The pairs of these names that are compared with a calibration of pairs a, b and c, and what is said: each has
+    /// the left and the right picture of the letters behind it.
     fn compared(pairs: &[&str]) -> (Vec<String>, Own) {
         let (_keep, root) = temporary_folder();
         let picture = |side: &str, content: char| {

@@ -12,8 +12,9 @@ use crate::programs::{Language, unread};
 use crate::robot::{Robot, file};
 use crate::{config, files, progress};
 
-/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the `compensate.json` beside them, in one
-/// of these folders, or in a folder beside any of these or of the working directory, where they are a copy.
+/// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the
+/// `compensate.json` beside them, in one of these folders, or in a folder beside any of these or of the working
+/// directory, where they are a copy.
 pub(super) fn refuse_corrected(targets: &Utf8Path, folders: &[&Utf8Path]) -> Result<()> {
     let here = |folder: &Utf8Path| if folder.as_str().is_empty() { Utf8PathBuf::from(".") } else { folder.to_owned() };
     let folder = here(targets.parent().unwrap_or(Utf8Path::new("")));
@@ -91,7 +92,8 @@ pub(super) fn of_nominal(robot: &Utf8Path, identified: &Utf8Path) -> Option<Stri
     })
 }
 
-/// Warns of joint targets that look like radians in degrees, and of joints of which neither file, each with its robot, has the limits.
+/// Warns of joint targets that look like radians in degrees, and of joints of which neither file, each with its robot,
+/// has the limits.
 pub(super) fn warn(rows: &[Row], [(drawn, nominal), (found, robot)]: [(&Utf8Path, &Robot); 2]) {
     let turning = |row: &Row| -> Option<Vec<f64>> {
         let readings = row.given.as_ref().filter(|_| matches!(row.target, Target::Readings(_)))?;
@@ -100,7 +102,8 @@ pub(super) fn warn(rows: &[Row], [(drawn, nominal), (found, robot)]: [(&Utf8Path
     let largest_deg = |readings: &Vec<f64>| readings.iter().fold(0.0_f64, |most, q| most.max(q.abs()));
     let largest: Vec<f64> = rows.iter().filter_map(turning).map(|readings| largest_deg(&readings)).collect();
     let most_deg = largest.iter().fold(0.0_f64, |most, q| most.max(*q));
-    // A turn is 6.28 rad. An arm that moves a tool turns some joint by more than as many degrees; its zero posture alone says nothing.
+    // A turn is 6.28 rad. An arm that moves a tool turns some joint by more than as many degrees; its zero posture
+    // alone says nothing.
     if most_deg > 0.0 && most_deg <= std::f64::consts::TAU {
         progress::warn(format!(
             "no joint of these targets is farther than {most_deg:.3} deg from zero: are they radians? A table says so by columns `j1_rad`.."

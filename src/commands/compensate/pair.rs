@@ -19,7 +19,8 @@ const SAME_MM: f64 = 1e-6;
 /// How far the flanges of one arm are apart on average, mm: a nominal robot is off by a few.
 const ONE_ARM_MM: f64 = 10.0;
 
-/// How far off a nominal robot is at most once its tool and its base are right, mm, and at how many postures that is looked at.
+/// How far off a nominal robot is at most once its tool and its base are right, mm, and at how many postures that is
+/// looked at.
 const NEAR_MM: f64 = 5.0;
 const POSTURES: usize = 200;
 
@@ -62,7 +63,8 @@ impl Pair {
         let identified = of_one_tool(&nominal, identified, &args.identified);
         let off = Residual::between(&nominal, &identified);
         let apart = record::links_apart(&nominal, &identified);
-        // Terms that were found over a part of the joints' ranges, and links that were split between them, mean nothing beyond it.
+        // Terms that were found over a part of the joints' ranges, and links that were split between them, mean nothing
+        // beyond it.
         let over = known::identified_over(&args.identified, &identified);
         let is_near = || over.is_some_and(|ranges| nearest_mm(&nominal.within(&ranges), &identified) < NEAR_MM);
         // Of what was identified from the very file its own `check` says what is wrong.
@@ -81,8 +83,9 @@ impl Pair {
         Ok(pair)
     }
 
-    /// The tool for both where one is named, or where one file alone has one; by how much those of the files are apart otherwise, mm. A file
-    /// without a tool, or with one in the last frame's origin, says nothing of it: its targets are moved by the arm's errors alone.
+    /// The tool for both where one is named, or where one file alone has one; by how much those of the files are apart
+    /// otherwise, mm. A file without a tool, or with one in the last frame's origin, says nothing of it: its targets
+    /// are moved by the arm's errors alone.
     fn choose_tool(&mut self, args: &Compensate) -> f64 {
         let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
         self.tool_mm = <[f64; 3]>::try_from(args.tool.as_slice()).ok().map(Vector3::from);
@@ -122,7 +125,8 @@ impl Pair {
         apart_mm
     }
 
-    /// What no measurement of a point told from the target's own place, and what therefore stays in another tool: the last link's length and zero.
+    /// What no measurement of a point told from the target's own place, and what therefore stays in another tool: the
+    /// last link's length and zero.
     fn stays(&self, typed: Vector3<f64>, robot: &Utf8Path) -> Option<String> {
         let (drawn, found) = (self.nominal.tool_mm, self.identified.tool_mm);
         if found == Vector3::zeros() || (found - typed).norm() < SAME_MM {
@@ -141,8 +145,8 @@ impl Pair {
     }
 }
 
-/// The identified robot with the nominal one's last link, where its own is longer or turned by more than links are built: that is a tool of which
-/// the nominal file knows nothing, and no measurement of a point tells the two apart.
+/// The identified robot with the nominal one's last link, where its own is longer or turned by more than links are
+/// built: that is a tool of which the nominal file knows nothing, and no measurement of a point tells the two apart.
 fn of_one_tool(nominal: &Robot, identified: Robot, file: &Utf8Path) -> Robot {
     let taken = identified.with_last_link_of(nominal);
     let is_tool = record::links_apart(nominal, &identified) != record::links_apart(nominal, &taken);
@@ -157,7 +161,8 @@ fn of_one_tool(nominal: &Robot, identified: Robot, file: &Utf8Path) -> Robot {
     taken
 }
 
-/// How far the target of another robot is from that of this one over its joints' ranges, in the middle, with a tool and a base of its own, mm.
+/// How far the target of another robot is from that of this one over its joints' ranges, in the middle, with a tool and
+/// a base of its own, mm.
 fn nearest_mm(nominal: &Robot, other: &Robot) -> f64 {
     let joints: Vec<Vec<f64>> = (0..POSTURES).map(|k| inverse::spread_start(nominal, k)).collect();
     let points: Vec<Point3<f64>> = joints.iter().map(|q| other.target_mm(q)).collect();

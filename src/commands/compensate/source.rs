@@ -1,6 +1,7 @@
 //! The text of a program, with that of its data file behind it where points stand there.
 //!
-//! In: the program's file. Out: one text, in which a motion finds its points, and with other readings the bytes of both files again.
+//! In: the program's file. Out: one text, in which a motion finds its points, and with other readings the bytes of both
+//! files again.
 
 use camino::{Utf8Path, Utf8PathBuf};
 
@@ -60,7 +61,8 @@ impl Source {
         if line > before { line - before } else { line }
     }
 
-    /// The files with other readings for some of their targets, the program's first; the data file where one of them stands there.
+    /// The files with other readings for some of their targets, the program's first; the data file where one of them
+    /// stands there.
     pub(super) fn corrected<'a>(
         &'a self,
         program: &'a Utf8Path,

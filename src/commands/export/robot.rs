@@ -57,8 +57,8 @@ fn holds(format: RobotFormat) -> &'static str {
     }
 }
 
-/// A robot file that is no export, such as the nominal one that `simulate` and `robot new` write under the same name, is not replaced
-/// by a corrected one: the next identification would start from it.
+/// A robot file that is no export, such as the nominal one that `simulate` and `robot new` write under the same name,
+/// is not replaced by a corrected one: the next identification would start from it.
 fn spare_other_robots(path: &camino::Utf8Path, exported: &ExportedRobot) -> Result<()> {
     let Ok(standing) = std::fs::read_to_string(path) else { return Ok(()) };
     let is_export = standing.lines().take_while(|line| line.starts_with('#')).any(|line| line.contains("export robot"));
@@ -149,7 +149,8 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
     Ok(nominal)
 }
 
-/// A robot, what its file says of its use, and the ranges of its joints over which it was identified, where they are known.
+/// A robot, what its file says of its use, and the ranges of its joints over which it was identified, where they are
+/// known.
 struct Identified {
     robot: Robot,
     check: Option<Check>,

@@ -1,4 +1,5 @@
-//! What the page of `measure` shows beside the results: small pictures of what went wrong, and distances as the robot was sent.
+//! What the page of `measure` shows beside the results: small pictures of what went wrong, and distances as the robot
+//! was sent.
 
 use camino::Utf8Path;
 use rayon::prelude::*;
@@ -24,8 +25,8 @@ const WIDTH: u32 = 720;
 /// The robot that was sent, where none is named.
 const ROBOT: &str = "robot.toml";
 
-/// Small pictures of the poses without a measurement and of those that fit worst. `files` are the pictures, `wanted` is what was looked
-/// for in them.
+/// Small pictures of the poses without a measurement and of those that fit worst. `files` are the pictures, `wanted` is
+/// what was looked for in them.
 pub(super) fn thumbnails(
     series: &Series,
     corners: &Corners,
@@ -86,7 +87,8 @@ pub(super) fn shifted(series: &Series) -> Result<Option<String>> {
     Ok(shifted::find(&set, &robot).map(said))
 }
 
-/// Distances to each group's centre as commanded and what was measured beyond them, mm, where a robot of so many joints is known.
+/// Distances to each group's centre as commanded and what was measured beyond them, mm, where a robot of so many joints
+/// is known.
 pub(super) fn distances(series: &Series) -> Result<Vec<(f64, f64)>> {
     let robot = sent()?;
     if series.poses.iter().any(|m| m.at.joints_deg.len() != robot.joints.len()) {

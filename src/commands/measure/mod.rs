@@ -139,7 +139,8 @@ fn seen(poses: Vec<RobotPose>, corners: &Corners) -> Vec<Seen> {
     seen
 }
 
-/// The pictures of poses that have none of their name, but of the same number: `0105` of `105`, where no other is meant.
+/// The pictures of poses that have none of their name, but of the same number: `0105` of `105`, where no other is
+/// meant.
 fn numbers_without_zeros<'a>(poses: &[RobotPose], pictures: impl Iterator<Item = &'a str>) -> BTreeMap<String, String> {
     let bare = |name: &str| {
         let digits = !name.is_empty() && name.bytes().all(|b| b.is_ascii_digit());

@@ -1,8 +1,9 @@
 //! `measure --watch`: pictures are looked at as they arrive, and a pose that must be taken again is named at once.
 //!
-//! A picture counts as arrived when its size and its time have stayed the same from one look into the folder to the next and it can be
-//! decoded; one that cannot is waited for. What is found is kept in the cache, so that the run that follows, an ordinary one with the same
-//! bytes, costs no second look. It begins when every pose of the list was seen, or on Ctrl-C.
+//! A picture counts as arrived when its size and its time have stayed the same from one look into the folder to the
+//! next and it can be decoded; one that cannot is waited for. What is found is kept in the cache, so that the run that
+//! follows, an ordinary one with the same bytes, costs no second look. It begins when every pose of the list was seen,
+//! or on Ctrl-C.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;

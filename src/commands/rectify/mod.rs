@@ -204,8 +204,8 @@ fn plan(args: &Rectify, rig: &Rig, volume: Option<&Volume>) -> Result<Plan> {
     Ok(Plan { file, maps, matrices: Some(matrices), lost })
 }
 
-/// That a rectified picture does not show the middle of where the boards stood: common rows look at right angles to the line between the cameras,
-/// and of cameras that look along it, or at one near place, that is elsewhere.
+/// That a rectified picture does not show the middle of where the boards stood: common rows look at right angles to the
+/// line between the cameras, and of cameras that look along it, or at one near place, that is elsewhere.
 fn lost(volume: &Volume, rig: &Rig, matrices: &Matrices) -> Option<String> {
     let [low, high] = volume.bounding_box_mm(rig);
     let middle_mm = 0.5 * (low + high);

@@ -1,4 +1,5 @@
-//! What a board in rectified pictures says of them: whether their rows agree, and whether it comes out as large as it is.
+//! What a board in rectified pictures says of them: whether their rows agree, and whether it comes out as large as it
+//! is.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -14,7 +15,8 @@ use crate::imaging::{Board, PairCorners, Wanted};
 use crate::progress;
 use crate::stereo::model::rectification::{Matrices, SizeResidual, row_differences, row_residual};
 
-/// Pairs on which each board is looked for before it is taken as not there: on pictures of something else the search takes seconds.
+/// Pairs on which each board is looked for before it is taken as not there: on pictures of something else the search
+/// takes seconds.
 const FIRST_LOOKED_AT: usize = 4;
 
 /// The board that the pictures show, and its corners in the rectified pictures.
@@ -38,7 +40,8 @@ pub(super) fn boards(args: &Rectify, config: &Config, calibrated: Option<Board>)
     Ok(boards)
 }
 
-/// The first of the boards that the pictures show, or another that most of them show instead: rows are those of any board.
+/// The first of the boards that the pictures show, or another that most of them show instead: rows are those of any
+/// board.
 pub(super) fn look_for(pairs: &[PairFiles], boards: &[Board]) -> Option<Found> {
     let look = |board: Board, pairs: &[PairFiles]| -> Vec<_> {
         let bar = progress::bar("looking for the board", pairs.len() as u64);
@@ -95,7 +98,8 @@ fn named(boards: &[Board]) -> String {
     boards.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The pairs with how well their rows agree, and the one that agrees worst; what the boards' size says of the disparities, where it is known.
+/// The pairs with how well their rows agree, and the one that agrees worst; what the boards' size says of the
+/// disparities, where it is known.
 pub(super) fn judge(
     mut file: RectifiedFile,
     kept: Vec<(String, [String; 2])>,
@@ -125,7 +129,8 @@ pub(super) fn judge(
     }
 }
 
-/// How large the board comes out that calibrated the rig, where it is the one that was found, beside what lengths can be trusted to, mm.
+/// How large the board comes out that calibrated the rig, where it is the one that was found, beside what lengths can
+/// be trusted to, mm.
 pub(super) fn size(
     found: Option<&Found>,
     calibrated: Option<Board>,

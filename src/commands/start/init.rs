@@ -78,7 +78,8 @@ mod tests {
         assert_eq!(toml::from_str::<Config>(SETTINGS).unwrap(), Config::default());
     }
 
-    /// A key that is missing from the file is a key that nobody finds: those of the structs, as their `Debug` names them.
+    /// A key that is missing from the file is a key that nobody finds: those of the structs, as their `Debug` names
+    /// them.
     #[test]
     fn the_settings_file_has_every_key() {
         let shown = format!("{:#?}", Config::default());

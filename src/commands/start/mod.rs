@@ -1,4 +1,5 @@
-//! What is asked for before there is anything to run: starter files, the guide, the shell's completions and manual pages.
+//! What is asked for before there is anything to run: starter files, the guide, the shell's completions and manual
+//! pages.
 
 pub mod guide;
 pub mod init;

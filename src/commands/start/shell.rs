@@ -1,4 +1,5 @@
-//! `stereocal completions` and `stereocal man`: what the shell and `man` read, made of the command line's own description.
+//! `stereocal completions` and `stereocal man`: what the shell and `man` read, made of the command line's own
+//! description.
 
 use clap::CommandFactory;
 

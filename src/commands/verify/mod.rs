@@ -1,7 +1,9 @@
-//! `stereocal verify`: Table 3 of the paper for robots from anywhere; nothing of them is fitted, only the sensor's placement.
+//! `stereocal verify`: Table 3 of the paper for robots from anywhere; nothing of them is fitted, only the sensor's
+//! placement.
 //!
-//! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows: units are mended and
-//! sessions get placements of their own. The robots are those of their files, and each takes the rows as it counts its joints.
+//! Measurements are examined as `identify` examines them, with the first robot, so that both judge by the same rows:
+//! units are mended and sessions get placements of their own. The robots are those of their files, and each takes the
+//! rows as it counts its joints.
 
 mod recheck;
 
@@ -37,7 +39,8 @@ struct Verified {
 struct RobotVerified {
     file: String,
     verify: PointSpread,
-    /// The tool that the robot's links ask for, where they come several times nearer with it than with that of the file.
+    /// The tool that the robot's links ask for, where they come several times nearer with it than with that of the
+    /// file.
     #[serde(skip_serializing_if = "Option::is_none")]
     asked_tool: Option<AskedTool>,
     /// The same without the strays; absent without any.
@@ -71,7 +74,8 @@ impl RobotVerified {
     }
 }
 
-/// Makes verify rows samples where the file has none to place the sensor by, as a file of nothing but fresh poses; says whether it did.
+/// Makes verify rows samples where the file has none to place the sensor by, as a file of nothing but fresh poses; says
+/// whether it did.
 fn place_by_verify_rows(rows: &mut [Measurement]) -> bool {
     let usable =
         |role: Role| move |row: &Measurement| row.at.role == role && !matches!(row.observed, Observed::Missing { .. });
@@ -102,7 +106,8 @@ fn fitted_to(file: &Utf8Path, rows: &[Measurement]) -> Option<String> {
 /// What the examination makes of the rows.
 struct Rows {
     set: Dataset,
-    /// The same with signs and zeros of joints mended for the first robot, where it counts them otherwise than they are written.
+    /// The same with signs and zeros of joints mended for the first robot, where it counts them otherwise than they are
+    /// written.
     counted: Option<Dataset>,
     /// Whether rows and robots are what their files say and something explains the errors.
     is_sound: bool,
@@ -168,7 +173,8 @@ fn tell(set: &Dataset, folded: bool, only_verify: bool) {
     }
 }
 
-/// The rows, whose targets stand where the identification of one of the robots found them, or as the first robot joins them.
+/// The rows, whose targets stand where the identification of one of the robots found them, or as the first robot joins
+/// them.
 fn of_rows(args: &Verify, rows: &[Measurement], first: Option<&Robot>) -> Result<Dataset> {
     let of_places = args.robot.iter().find_map(|file| targets::of_places(rows, &known::places_mm(file)));
     let mut set = match (of_places, first) {

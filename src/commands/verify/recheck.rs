@@ -93,7 +93,8 @@ fn opened(args: &Verify, against: &Utf8Path, config: &Config, run: Run, paths: &
     Ok(OutDir::open(args.out.as_deref().unwrap_or(&config.out))?.for_run(&run, &inputs))
 }
 
-/// Where the sensor stood: as the file says that is named, which must have a group of these rows, or one beside the robot, where it is there.
+/// Where the sensor stood: as the file says that is named, which must have a group of these rows, or one beside the
+/// robot, where it is there.
 fn stood(named: Option<&Utf8Path>, against: &Utf8Path, set: &Dataset) -> Result<Option<PlacementFile>> {
     let path = named.map_or_else(|| against.with_file_name(PLACEMENT), Utf8Path::to_owned);
     let file = match PlacementFile::read(&path) {
@@ -128,9 +129,10 @@ fn of_targets(rows: &[Measurement], against: &Utf8Path) -> std::result::Result<D
     }
 }
 
-/// Whether the robot changed, or what measured it moved, by these rows. Where rows are outside of the ranges that it was identified in, that is open where
-/// the other rows do not show it as well, and it is no more than what the model may lack there: it goes where the terms beyond the links are as
-/// uncertain as they are large, or it is nothing single or the zero of a joint that is outside, and no more than what was corrected of the robot.
+/// Whether the robot changed, or what measured it moved, by these rows. Where rows are outside of the ranges that it
+/// was identified in, that is open where the other rows do not show it as well, and it is no more than what the model
+/// may lack there: it goes where the terms beyond the links are as uncertain as they are large, or it is nothing single
+/// or the zero of a joint that is outside, and no more than what was corrected of the robot.
 fn compared(
     (set, robot): (&Dataset, &Robot),
     against: &Utf8Path,
@@ -159,7 +161,8 @@ fn compared(
     })
 }
 
-/// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from are not known again in others.
+/// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from
+/// are not known again in others.
 fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, Option<String>)> {
     still::check_points(&set)?;
     Ok(match on_rows::of_known(&set, robot, p95_mm, &config.identify) {

@@ -1,9 +1,10 @@
 //! Boards as other programs describe them.
 //!
-//! In: a board's name, or the path of a file that describes it: Kalibr's target file (YAML; the wiki of ethz-asl/kalibr, "Calibration targets"), the
-//! project of calib.io's Calibrator (JSON; calibio/calibrator-examples, `opencv_parameters/stereo_calibration.json`), or a file of calib.io's
-//! pattern generator, whose name says what is on it (`calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf`: the paper, rows x columns, square, marker,
-//! dictionary). Out: the board. Goes wrong: another kind of board, which is named.
+//! In: a board's name, or the path of a file that describes it: Kalibr's target file (YAML; the wiki of
+//! ethz-asl/kalibr, "Calibration targets"), the project of calib.io's Calibrator (JSON; calibio/calibrator-examples,
+//! `opencv_parameters/stereo_calibration.json`), or a file of calib.io's pattern generator, whose name says what is on
+//! it (`calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf`: the paper, rows x columns, square, marker, dictionary). Out:
+//! the board. Goes wrong: another kind of board, which is named.
 
 use camino::Utf8Path;
 use serde::Deserialize;

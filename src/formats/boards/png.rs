@@ -1,7 +1,8 @@
 //! A board to print as PNG: for presses and services that take no PDF.
 //!
-//! In: a sheet and dots per inch. Out: a grey PNG that says its resolution, and the board's name as a text. Method: a dot is as dark as the share of it that
-//! is printed, so that edges lie where they should between dots, too. Goes wrong: a resolution at which the sheet has too many dots.
+//! In: a sheet and dots per inch. Out: a grey PNG that says its resolution, and the board's name as a text. Method: a
+//! dot is as dark as the share of it that is printed, so that edges lie where they should between dots, too. Goes
+//! wrong: a resolution at which the sheet has too many dots.
 
 use png::{BitDepth, ColorType, Encoder, PixelDimensions, Unit};
 

@@ -1,6 +1,7 @@
 //! A board to print: a sheet of paper with the board in true size, a ruler to check the print by, and the board's name.
 //!
-//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`png`). Goes wrong: a board that no paper up to A0 holds, and printers that scale to fit: the ruler shows it.
+//! In: a board. Out: SVG and PDF, all lengths in mm; PNG (`png`). Goes wrong: a board that no paper up to A0 holds, and
+//! printers that scale to fit: the ruler shows it.
 
 use std::fmt::Write as _;
 
@@ -165,7 +166,8 @@ impl Sheet {
         sheet.finish();
         pdf.type1_font(font).base_font(Name(b"Helvetica"));
         let mut content = Content::new();
-        // From here on in mm from the lower left corner: numbers of seven digits then hold a thousandth of a micrometre of a square.
+        // From here on in mm from the lower left corner: numbers of seven digits then hold a thousandth of a micrometre
+        // of a square.
         let scale = points(1.0);
         content.transform([scale, 0.0, 0.0, scale, 0.0, 0.0]);
         for patch in &self.patches {

@@ -1,8 +1,8 @@
 //! OpenCV's FileStorage, YAML, with the names of its own stereo example: `M1 D1 M2 D2 R T`. Lengths in mm.
 //!
-//! What follows from them stands there too, for programs that read it: `E F` as `stereoCalibrate` gives them, and `R1 R2 P1 P2 Q` as
-//! `stereoRectify` gives them with its own defaults (`rectify_flags` 1024 is `CALIB_ZERO_DISPARITY`, `rectify_alpha` -1) for pictures of
-//! `image_width` x `image_height`. It is written, not read back.
+//! What follows from them stands there too, for programs that read it: `E F` as `stereoCalibrate` gives them, and `R1
+//! R2 P1 P2 Q` as `stereoRectify` gives them with its own defaults (`rectify_flags` 1024 is `CALIB_ZERO_DISPARITY`,
+//! `rectify_alpha` -1) for pictures of `image_width` x `image_height`. It is written, not read back.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -54,8 +54,8 @@ pub fn read(text: &str) -> Result<Rig, String> {
     checked::rig((one(text, size, "M1", "D1")?, one(text, right_size, "M2", "D2")?), ("R", rotation), translation, None)
 }
 
-/// Names that programs give the matrix and the coefficients of a single camera: OpenCV's example of today and of its second version, and
-/// what people write by hand.
+/// Names that programs give the matrix and the coefficients of a single camera: OpenCV's example of today and of its
+/// second version, and what people write by hand.
 const SINGLE: [(&str, &str); 4] = [
     ("camera_matrix", "distortion_coefficients"),
     ("Camera_Matrix", "Distortion_Coefficients"),

@@ -1,7 +1,8 @@
 //! A rig in the words of other programs, read back.
 //!
-//! Angles and pixels mean the same in all of them (pixel (0, 0) is the centre of the top-left pixel); lengths are mm in OpenCV's file and
-//! metres in the others, as is usual there. A lens that a format cannot say is refused, never approximated.
+//! Angles and pixels mean the same in all of them (pixel (0, 0) is the centre of the top-left pixel); lengths are mm in
+//! OpenCV's file and metres in the others, as is usual there. A lens that a format cannot say is refused, never
+//! approximated.
 
 use camino::Utf8Path;
 
@@ -38,7 +39,8 @@ pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
     text.contains("!!opencv-matrix").then(|| file_storage::read(text))
 }
 
-/// Reads a file that holds one camera: ROS, mrcal, OpenCV's example, a Kalibr chain of one. `None` where the text is none of them.
+/// Reads a file that holds one camera: ROS, mrcal, OpenCV's example, a Kalibr chain of one. `None` where the text is
+/// none of them.
 pub fn read_camera(text: &str) -> Option<Result<Camera, String>> {
     if text.contains("'lensmodel'") {
         return Some(mrcal::read_camera(text));

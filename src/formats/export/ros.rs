@@ -1,7 +1,7 @@
 //! ROS camera_info, one file a camera, rectified so that the rows of both cameras agree. Lengths in metres.
 //!
-//! Rectification (Bouguet): each camera takes half of the rotation between them, then both turn so that x lies along the
-//! baseline. `P` of the right camera holds `-f b` in its fourth column.
+//! Rectification (Bouguet): each camera takes half of the rotation between them, then both turn so that x lies along
+//! the baseline. `P` of the right camera holds `-f b` in its fourth column.
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 

@@ -1,10 +1,12 @@
-//! Values behind a key in a YAML or Python-like text: enough for calibration files, which are keys and lists of numbers.
+//! Values behind a key in a YAML or Python-like text: enough for calibration files, which are keys and lists of
+//! numbers.
 //!
-//! A list is what stands behind its own key and nothing else: in brackets (nested ones count row by row), as YAML's rows
-//! that start with a dash, or as the `data` of a matrix with `rows` and `cols`. A key that stands twice is refused, and so
-//! is any other count of numbers than the one that is needed.
+//! A list is what stands behind its own key and nothing else: in brackets (nested ones count row by row), as YAML's
+//! rows that start with a dash, or as the `data` of a matrix with `rows` and `cols`. A key that stands twice is
+//! refused, and so is any other count of numbers than the one that is needed.
 
-/// The text behind a key at the start of a line (blanks and quotes aside), up to the end of the file; an error where the key stands twice.
+/// The text behind a key at the start of a line (blanks and quotes aside), up to the end of the file; an error where
+/// the key stands twice.
 pub fn behind<'a>(text: &'a str, key: &str) -> Result<Option<&'a str>, String> {
     Ok(place(text, key)?.map(|(_, rest)| rest))
 }

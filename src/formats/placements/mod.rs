@@ -1,7 +1,7 @@
 //! A placement in other programs' words: where a camera stands in the robot's base frame, and the target on the flange.
 //!
-//! In: `base_from_camera` and `flange_from_target` in mm, and the names that the frames are to have. Out: a file a placement.
-//! ROS's optical frame (REP 103: x right, y down, z forward) is the camera's frame here.
+//! In: `base_from_camera` and `flange_from_target` in mm, and the names that the frames are to have. Out: a file a
+//! placement. ROS's optical frame (REP 103: x right, y down, z forward) is the camera's frame here.
 
 pub mod record;
 
@@ -29,9 +29,9 @@ pub struct Placement<'a> {
 impl Placement<'_> {
     /// easy_handeye's calibration file (ROS 1; `~/.ros/easy_handeye/NAME.yaml`): an eye-on-base calibration.
     ///
-    /// The form is `HandeyeCalibration.to_dict` in `easy_handeye/src/easy_handeye/handeye_calibration.py` of IFL-CAMP/easy_handeye:
-    /// `parameters` with every argument of `HandeyeCalibrationParameters`, and `transformation`, which is published from
-    /// `robot_base_frame` (parent) to `tracking_base_frame` (child), in metres.
+    /// The form is `HandeyeCalibration.to_dict` in `easy_handeye/src/easy_handeye/handeye_calibration.py` of
+    /// IFL-CAMP/easy_handeye: `parameters` with every argument of `HandeyeCalibrationParameters`, and `transformation`,
+    /// which is published from `robot_base_frame` (parent) to `tracking_base_frame` (child), in metres.
     pub fn easy_handeye(&self, name: &str) -> String {
         let parameters = [
             ("eye_on_hand", "false".to_owned()),
@@ -52,10 +52,12 @@ impl Placement<'_> {
         text
     }
 
-    /// OpenCV's FileStorage, YAML, with the names of `calibrateHandEye` and `calibrateRobotWorldHandEye` for a camera that stands still, in mm.
+    /// OpenCV's FileStorage, YAML, with the names of `calibrateHandEye` and `calibrateRobotWorldHandEye` for a camera
+    /// that stands still, in mm.
     ///
-    /// `R_cam2base`, `t_cam2base` map camera coordinates to the base's, as `calibrateHandEye` gives them for poses of the base in the gripper
-    /// (OpenCV documents that use for an eye to hand); `R_target2gripper`, `t_target2gripper` those of the target to the flange's.
+    /// `R_cam2base`, `t_cam2base` map camera coordinates to the base's, as `calibrateHandEye` gives them for poses of
+    /// the base in the gripper (OpenCV documents that use for an eye to hand); `R_target2gripper`, `t_target2gripper`
+    /// those of the target to the flange's.
     pub fn file_storage(&self) -> String {
         let mut text = String::from("%YAML:1.0\n---\n");
         let mut add = |name: &str, transform: &Transform| {
@@ -71,8 +73,9 @@ impl Placement<'_> {
 
     /// A ROS 2 launch file in YAML that publishes the placement on `/tf_static`.
     ///
-    /// The arguments are those of `tf2_ros/src/static_transform_broadcaster_program.cpp` in ros2/geometry2: `--x --y --z` in metres, `--qx --qy --qz
-    /// --qw`, `--frame-id` of the parent and `--child-frame-id`. The published transform maps the child's coordinates to the parent's.
+    /// The arguments are those of `tf2_ros/src/static_transform_broadcaster_program.cpp` in ros2/geometry2: `--x --y
+    /// --z` in metres, `--qx --qy --qz --qw`, `--frame-id` of the parent and `--child-frame-id`. The published
+    /// transform maps the child's coordinates to the parent's.
     pub fn ros_static_tf(&self) -> String {
         let node = |parent: &str, child: &str, transform: &Transform| {
             let numbers = metres_and_quaternion(transform).map(|(name, value)| format!("--{name} {value}")).join(" ");

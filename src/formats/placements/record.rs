@@ -17,7 +17,8 @@ use crate::robot::{Check, Parameter};
 /// The file's name in a results folder.
 pub const PLACEMENT: &str = "placement.json";
 
-/// The file. Transforms are between the robot's root (before `[base]`), its flange (behind `[flange]`), the sensor and the target.
+/// The file. Transforms are between the robot's root (before `[base]`), its flange (behind `[flange]`), the sensor and
+/// the target.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlacementFile {
     /// The robot file that it belongs to: held numbers are its own.
@@ -28,7 +29,8 @@ pub struct PlacementFile {
     /// Whether an instrument measured that is none of cameras: the "rig" is then the frame of its points.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_instrument: bool,
-    /// Whether the points are left-handed in their file and x of them was negated before they were placed: no transform places them as they are read.
+    /// Whether the points are left-handed in their file and x of them was negated before they were placed: no transform
+    /// places them as they are read.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub mirrored: bool,
     /// Placements of the sensor; none where distances were read.
@@ -106,7 +108,8 @@ impl TransformRecord {
         (three(self.translation_mm, 3), turn)
     }
 
-    /// Standard deviations of the turn, rad, and of the shift, mm, each as the root of the mean square of its three; `None` for what was not found.
+    /// Standard deviations of the turn, rad, and of the shift, mm, each as the root of the mean square of its three;
+    /// `None` for what was not found.
     pub fn sigmas(&self) -> [Option<f64>; 2] {
         [0, 3].map(|first| {
             let variances = (first..first + 3).map(|k| self.covariance[k][k]).collect::<Option<Vec<f64>>>()?;
@@ -157,7 +160,8 @@ impl PlacementFile {
         }
     }
 
-    /// Where a group's sensor stood, of several places the last, as the chain has it; `None` of a group that is not there.
+    /// Where a group's sensor stood, of several places the last, as the chain has it; `None` of a group that is not
+    /// there.
     pub fn sensor_from_base(&self, group: &str, root_from_frame0: &Transform) -> Option<Uncertain> {
         let record = &self.groups.iter().rfind(|g| g.group == group)?.base_from_rig;
         let entries: Option<Vec<f64>> = record.covariance.iter().flatten().copied().collect();

@@ -1,9 +1,10 @@
-//! A Denavit-Hartenberg table: a row a joint from the base, columns alpha, a, theta and d in any order, optionally `beta_deg` and
-//! limits, `min_deg,max_deg`.
+//! A Denavit-Hartenberg table: a row a joint from the base, columns alpha, a, theta and d in any order, optionally
+//! `beta_deg` and limits, `min_deg,max_deg`.
 //!
-//! In: a table in any form, with names of its columns or without, or the text of a program or of settings ([`super::dh_text`]). Cells may be formulas
-//! (`pi/2`, `q2 - 90`). Out: every way to read it, each with what was taken and what is open; with names of columns there is one. Where some rows
-//! have their joint's variable for theta, rows at the end without one are the flange. What goes wrong: rows that hold still between others, sliding joints, and what
+//! In: a table in any form, with names of its columns or without, or the text of a program or of settings
+//! ([`super::dh_text`]). Cells may be formulas (`pi/2`, `q2 - 90`). Out: every way to read it, each with what was taken
+//! and what is open; with names of columns there is one. Where some rows have their joint's variable for theta, rows at
+//! the end without one are the flange. What goes wrong: rows that hold still between others, sliding joints, and what
 //! numbers rule out; refused with the line.
 
 mod beside;

@@ -1,11 +1,12 @@
 //! Denavit-Hartenberg parameters in the text of programs and settings.
 //!
-//! In: text. Out: a row a joint, alpha, a, theta, d as they stand there, and the convention where words say it. Forms: links that are built one by one with
-//! named parameters (`RevoluteDH(d=0.1, a=0, alpha=pi/2)`, `Link('d', 0.1, 'a', 0, ...)`, `{a: 0, alpha: 1.57, ...}`, keys one below the other);
-//! `Link([theta d a alpha])` of the Robotics Toolbox for MATLAB; a list a parameter (`a = [0, -0.4, ...]`); and parameters with numbers
-//! (`alpha0: 0, a0: 0, d1: 0.3, alpha1: -pi/2`). Parameters that a link's call
-//! does not name are zero. Names that the text sets to a number stand for it.
-//! What goes wrong: a parameter that is no number, links of several robots, sliding joints that no call of a toolbox makes; all refused with the line.
+//! In: text. Out: a row a joint, alpha, a, theta, d as they stand there, and the convention where words say it. Forms:
+//! links that are built one by one with named parameters (`RevoluteDH(d=0.1, a=0, alpha=pi/2)`, `Link('d', 0.1, 'a', 0,
+//! ...)`, `{a: 0, alpha: 1.57, ...}`, keys one below the other); `Link([theta d a alpha])` of the Robotics Toolbox for
+//! MATLAB; a list a parameter (`a = [0, -0.4, ...]`); and parameters with numbers (`alpha0: 0, a0: 0, d1: 0.3, alpha1:
+//! -pi/2`). Parameters that a link's call does not name are zero. Names that the text sets to a number stand for it.
+//! What goes wrong: a parameter that is no number, links of several robots, sliding joints that no call of a toolbox
+//! makes; all refused with the line.
 
 mod added;
 mod calls;

@@ -1,8 +1,9 @@
 //! What the words around a table say: its convention, and the units of its angles and lengths.
 //!
-//! In: comments, titles and sentences, and the text of a program without them. Out: what is said once; a unit that is said both ways is not said. A unit counts where the
-//! words say that something is in it (`lengths in cm`, `Unit [radian]`, `units: mm, deg`), and not on lines about limits and speeds; a convention
-//! where the line is about Denavit and Hartenberg. What goes wrong: words about something else; what the numbers rule out is not heard.
+//! In: comments, titles and sentences, and the text of a program without them. Out: what is said once; a unit that is
+//! said both ways is not said. A unit counts where the words say that something is in it (`lengths in cm`, `Unit
+//! [radian]`, `units: mm, deg`), and not on lines about limits and speeds; a convention where the line is about Denavit
+//! and Hartenberg. What goes wrong: words about something else; what the numbers rule out is not heard.
 
 use crate::robot::catalogue::Convention;
 use crate::tables::names::Unit;

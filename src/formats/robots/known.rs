@@ -1,4 +1,5 @@
-//! What `identification.json` says of the robot file beside it: how far to trust the robot, and the covariance of what was identified.
+//! What `identification.json` says of the robot file beside it: how far to trust the robot, and the covariance of what
+//! was identified.
 
 use std::collections::BTreeMap;
 
@@ -96,7 +97,8 @@ pub fn trust(robot: &Utf8Path) -> Trust {
     }
 }
 
-/// The error of a coordinate whose points are off by so much on average: over the root of three, and of a mean length over that of its square.
+/// The error of a coordinate whose points are off by so much on average: over the root of three, and of a mean length
+/// over that of its square.
 fn of_coordinate(mean_mm: f64) -> f64 {
     mean_mm / (MEAN_OVER_RMS * 3f64.sqrt())
 }
@@ -110,7 +112,8 @@ pub fn left_open(file: &Utf8Path, robot: &Robot) -> Option<LeftOpen> {
     Some(LeftOpen { parameters, covariance, freedom, point_mm })
 }
 
-/// The ranges of the joints over which a robot was identified, rad (mm where a joint slides). `None` where nothing beside its file says so.
+/// The ranges of the joints over which a robot was identified, rad (mm where a joint slides). `None` where nothing
+/// beside its file says so.
 pub fn identified_over(file: &Utf8Path, robot: &Robot) -> Option<Vec<(f64, f64)>> {
     let ranges = beside(file)?.expected?.joint_ranges;
     let unit = |slides: bool| if slides { 1.0 } else { 1f64.to_radians() };
@@ -123,14 +126,16 @@ pub fn given(file: &Utf8Path) -> Given {
     beside(file).unwrap_or_default().rows
 }
 
-/// Where targets stand from the mark point along the flange's axes, mm, by name, where the robot joined them; none where their poses did.
+/// Where targets stand from the mark point along the flange's axes, mm, by name, where the robot joined them; none
+/// where their poses did.
 pub fn places_mm(file: &Utf8Path) -> BTreeMap<String, Vector3<f64>> {
     let joined = beside(file).and_then(|identified| identified.targets).filter(|t| t.scatter_mm.is_none());
     let placed = joined.into_iter().flat_map(|t| t.names.into_iter().zip(t.places_mm));
     placed.filter_map(|(name, place)| Some((name, place?.into()))).collect()
 }
 
-/// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's version.
+/// What is known of an identified robot. `None` where its file has no record beside it, or one of another program's
+/// version.
 pub fn before(file: &Utf8Path, robot: &Robot) -> Option<Before> {
     let identified = beside(file)?;
     let (Covariance { order, matrix }, expected) =

@@ -1,6 +1,7 @@
 //! A robot in other programs' words: URDF, tables, the kinematics of ROS and of Universal Robots.
 //!
-//! Each format carries the robot as far as it can; what it can carry is a [`Robot`] again, so that the rest is measured and said.
+//! Each format carries the robot as far as it can; what it can carry is a [`Robot`] again, so that the rest is measured
+//! and said.
 
 pub mod dh_csv;
 pub mod dh_text;

@@ -1,9 +1,9 @@
-//! The `kinematics` file of ROS's arm descriptions (as of `ur_description`): a frame a joint, metres and radians, each joint turning
-//! about its own z.
+//! The `kinematics` file of ROS's arm descriptions (as of `ur_description`): a frame a joint, metres and radians, each
+//! joint turning about its own z.
 //!
-//! In, where it is read: the file, in YAML's block or flow style. Out: the robot from the first frame's parent to the last frame, without limits. What goes
-//! wrong: names that do not say in which order the joints stand (YAML's keys have none, and some programs sort them), a frame that lacks a number, mm and
-//! degrees; refused with the line.
+//! In, where it is read: the file, in YAML's block or flow style. Out: the robot from the first frame's parent to the
+//! last frame, without limits. What goes wrong: names that do not say in which order the joints stand (YAML's keys have
+//! none, and some programs sort them), a frame that lacks a number, mm and degrees; refused with the line.
 
 use std::fmt::Write as _;
 

@@ -1,7 +1,7 @@
 //! `calibration.conf` of Universal Robots: deviations of a classic Denavit-Hartenberg table from the nominal one.
 //!
-//! The table has no place for Hayati's beta: nearly parallel axes are written by their common normal, as the maker does, and d runs to
-//! metres there (its pairs cancel). Method: the identified axes in space, converted anew.
+//! The table has no place for Hayati's beta: nearly parallel axes are written by their common normal, as the maker
+//! does, and d runs to metres there (its pairs cancel). Method: the identified axes in space, converted anew.
 
 use std::fmt::Write as _;
 

@@ -1,7 +1,8 @@
 //! URDF: a serial chain out of a robot description, and the same description with other joint origins.
 //!
-//! In: XML text. Out: the joints from the root link to a tip link, lengths in mm. Joints that no serial chain of motors has
-//! (mimic, floating, planar) are refused with the longest chain that does without them. Where the links fork, `branches` says which end is taken.
+//! In: XML text. Out: the joints from the root link to a tip link, lengths in mm. Joints that no serial chain of motors
+//! has (mimic, floating, planar) are refused with the longest chain that does without them. Where the links fork,
+//! `branches` says which end is taken.
 
 mod branches;
 
@@ -71,7 +72,8 @@ pub struct Chain<'a> {
     pub tip: String,
 }
 
-/// The text with blanks for a declaration that does not stand at its beginning, where alone XML allows it; places stay what they are.
+/// The text with blanks for a declaration that does not stand at its beginning, where alone XML allows it; places stay
+/// what they are.
 fn without_declaration(text: String) -> String {
     let body = text.trim_start_matches(['\u{feff}', ' ', '\t', '\r', '\n']);
     let start = text.len() - body.len();
@@ -227,8 +229,8 @@ impl Chain<'_> {
     }
 }
 
-/// Roll, pitch and yaw of a rotation, rad: `Rz(yaw) Ry(pitch) Rx(roll)`. Each is taken after the one before was undone, so that
-/// a pitch near a right angle, where roll and yaw can't be told apart, costs no digits.
+/// Roll, pitch and yaw of a rotation, rad: `Rz(yaw) Ry(pitch) Rx(roll)`. Each is taken after the one before was undone,
+/// so that a pitch near a right angle, where roll and yaw can't be told apart, costs no digits.
 pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let m = rotation.to_rotation_matrix().into_inner();
     let yaw = if m[(0, 0)].hypot(m[(1, 0)]) > 1e-9 { m[(1, 0)].atan2(m[(0, 0)]) } else { 0.0 };

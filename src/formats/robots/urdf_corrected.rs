@@ -1,8 +1,9 @@
 //! The maker's URDF with corrected joint origins: links, meshes, names, limits and axes stay as they are.
 //!
-//! A chain is its axes and its flange at reading zero (Brockett's product of exponentials), wherever the links' frames stand on those
-//! axes. So each moving joint's frame is turned by the shortest way until its axis has the identified direction, and set on the
-//! identified axis where it was nearest; the last one is set so that the flange, which hangs rigidly on it, is right.
+//! A chain is its axes and its flange at reading zero (Brockett's product of exponentials), wherever the links' frames
+//! stand on those axes. So each moving joint's frame is turned by the shortest way until its axis has the identified
+//! direction, and set on the identified axis where it was nearest; the last one is set so that the flange, which hangs
+//! rigidly on it, is right.
 
 use nalgebra::UnitQuaternion;
 

@@ -1,8 +1,8 @@
 //! Measurements sorted for identification: by group and role, with what could not be used and why.
 //!
-//! In: rows of `measurements.csv`. Out: poses with joint angles in rad and one kind of reading for all of them.
-//! A group without a centre row takes the used pose nearest to the centroid of its points as its reference; distances
-//! in such a group are distances to a fixed point that is unknown. Readings that follow each other at one pose are one (see [`super::repeats`]).
+//! In: rows of `measurements.csv`. Out: poses with joint angles in rad and one kind of reading for all of them. A group
+//! without a centre row takes the used pose nearest to the centroid of its points as its reference; its distances are
+//! to a fixed point that is unknown. Readings that follow each other at one pose are one (see [`super::repeats`]).
 
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 
@@ -80,7 +80,8 @@ pub struct Pose {
     /// Commanded angles, rad.
     pub joints_rad: Vec<f64>,
     pub reading: Reading,
-    /// Where on a body of several targets the point stands, from its mark point and in the body's frame, mm; `None` for the mark point itself.
+    /// Where on a body of several targets the point stands, from its mark point and in the body's frame, mm.
+    /// `None` for the mark point itself.
     pub on_body_mm: Option<Vector3<f64>>,
 }
 
@@ -111,9 +112,9 @@ pub struct Dataset {
     pub skipped: Vec<Skipped>,
     /// Readings that were repeated at one pose, where there were any.
     pub repeats: Option<Repeats>,
-    /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; empty without any.
+    /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; or empty.
     pub shared: Vec<Matrix3xX<f64>>,
-    /// Standard deviation of the scale of cameras about which nothing is stated, where `shared` is that scale and nothing else.
+    /// Standard deviation of the scale of cameras about which nothing is stated, where `shared` is that scale alone.
     pub supposed_scale: Option<f64>,
     /// Which joints slide; empty where none does.
     pub slides: Vec<bool>,
@@ -245,7 +246,7 @@ impl Dataset {
         rows.iter().map(|&row| self.poses[row].name.clone()).collect()
     }
 
-    /// Rows with a point, so many of each group at the least; an error where distances were measured, or where a group has fewer.
+    /// Rows with a point, so many of each group at the least; an error where distances were measured, or of fewer.
     pub fn placing_rows(&self, fewest: usize) -> Result<Vec<usize>, Error> {
         if self.kind != Kind::Positions {
             return Err(Error::ModelNeeds { model: "position", needed: "positions (x_mm, y_mm, z_mm)" });
@@ -271,8 +272,8 @@ impl Dataset {
     }
 
     /// The pose that a group's verification distances are measured from: its centre, or of the fitted rows the one
-    /// nearest to the centroid of their points. A centre that is not fitted, being a gross error, is no reference where other rows of its
-    /// group are. `None` where no row of the group is fitted, and for wire lengths.
+    /// nearest to the centroid of their points. A centre that is not fitted, being a gross error, is no reference where
+    /// other rows of its group are. `None` where no row of the group is fitted, and for wire lengths.
     pub fn reference(&self, group: usize, fitted: &[usize]) -> Option<usize> {
         if let Some(center) = self.groups[group].center
             && (fitted.contains(&center) || !fitted.iter().any(|&i| self.poses[i].group == group))
@@ -300,8 +301,7 @@ impl Dataset {
             && matches!(pose.reading, Reading::Distance { distance_mm, .. } if distance_mm == 0.0)
     }
 
-    /// Whether cameras read it: they state an orientation and a covariance with each point. Other instruments (a tracker, a wire, a probe) state
-    /// at most one of these.
+    /// Whether cameras read it: they state an orientation and a covariance with each point; others at most one.
     pub fn is_of_cameras(&self) -> bool {
         let both = |p: &Pose| p.reading.rotation_rad().is_some() && p.reading.covariance_mm2().is_some();
         !self.shared.is_empty() || self.poses.iter().any(both)
@@ -323,8 +323,8 @@ impl Dataset {
         self.targets.as_ref().is_some_and(|targets| targets.place_sigma_mm.is_some())
     }
 
-    /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted without it: where poses show a
-    /// part of a body of several targets.
+    /// How the target is turned on the flange, where orientations are used, or where a point cannot be predicted
+    /// without it: where poses show a part of a body of several targets.
     pub fn target_unknowns(&self, oriented: bool) -> &'static [Extra] {
         match oriented || !self.are_on_flange() && self.poses.iter().any(|p| p.on_body_mm.is_some()) {
             true => &[Extra::Target(0), Extra::Target(1), Extra::Target(2)],
@@ -333,7 +333,7 @@ impl Dataset {
     }
 }
 
-/// Whether a covariance has a direction without variance: rounded to zero, or an instrument's resolution taken for perfection.
+/// Whether a covariance has a direction without variance: rounded to zero, or a resolution taken for perfection.
 fn is_singular(covariance_mm2: &Matrix3<f64>) -> bool {
     let eigen = covariance_mm2.symmetric_eigenvalues();
     eigen.min() <= 1e-9 * eigen.max()

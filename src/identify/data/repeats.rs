@@ -1,9 +1,10 @@
 //! Readings that were repeated at one pose, as trackers measure: their mean, and their scatter.
 //!
-//! In: rows of measurements. Out: one row for rows of one group and role that follow each other with the same joints, and the standard deviation
-//! of a coordinate within them: what the instrument repeats. It says nothing about the robot, which stood still, so that as rows of their own
-//! they would count one error of the robot several times. A pose that the robot came back to is another row. One reading of three or more that is
-//! far from the others of its pose was misread, and is left out; of two nobody knows which.
+//! In: rows of measurements. Out: one row for rows of one group and role that follow each other with the same joints,
+//! and the standard deviation of a coordinate within them: what the instrument repeats. It says nothing about the
+//! robot, which stood still, so that as rows of their own they would count one error of the robot several times. A pose
+//! that the robot came back to is another row. One reading of three or more that is far from the others of its pose was
+//! misread, and is left out; of two nobody knows which.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -15,8 +16,8 @@ use crate::statistics::median;
 /// Readings of a pose that tell which of them was misread.
 const TELL: usize = 3;
 
-/// Times what readings are off the median of their pose, and mm at the least, that a reading which was misread is: an instrument drifts and
-/// settles by some times that, and by less than an arm repeats to.
+/// Times what readings are off the median of their pose, and mm at the least, that a reading which was misread is: an
+/// instrument drifts and settles by some times that, and by less than an arm repeats to.
 const FAR: f64 = 12.0;
 const LEAST_MM: f64 = 0.2;
 
@@ -113,7 +114,8 @@ fn numbers(row: &Measurement) -> Option<Vec<f64>> {
     }
 }
 
-/// The mean of what was read at one pose. Its covariance is that of one reading: what is stated may be shared by all of them.
+/// The mean of what was read at one pose. Its covariance is that of one reading: what is stated may be shared by all of
+/// them.
 fn mean(rows: &[Measurement]) -> Measurement {
     let mut one = rows[0].clone();
     let count = rows.len() as f64;

@@ -1,11 +1,11 @@
 //! Errors that all poses of a measured series share: the rig's calibration and the target's shape, from `measure.json`.
 //!
-//! In: per pose the sensitivity of the mark point to the shared parameters, and their covariance. Out: for each row of the data set what
-//! the leading shared errors move its point by, a standard deviation of each, and the row's own covariance without them. The
-//! parameters are many and most act alike, so they are replaced by the principal directions of what they do to the points; what
-//! the others do stays in the rows' own covariance.
-//! Where nothing is stated, cameras are still known to have one error in common: their scale.
-//! What goes wrong: a `measure.json` of other measurements; its shared part does not fit into their covariances, and nothing is changed.
+//! In: per pose the sensitivity of the mark point to the shared parameters, and their covariance. Out: for each row of
+//! the data set what the leading shared errors move its point by, a standard deviation of each, and the row's own
+//! covariance without them. The parameters are many and most act alike, so they are replaced by the principal
+//! directions of what they do to the points; what the others do stays in the rows' own covariance. Where nothing is
+//! stated, cameras are still known to have one error in common: their scale. What goes wrong: a `measure.json` of other
+//! measurements; its shared part does not fit into their covariances, and nothing is changed.
 
 use camino::Utf8Path;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, SymmetricEigen, Vector3};
@@ -28,8 +28,8 @@ const LEAST_OWN_MM2: f64 = 1e-8;
 /// Share of a row's variance by which the shared part may exceed it by rounding.
 const ROUNDING: f64 = 1e-3;
 
-/// How many times less certain a rig's scale is than its points, both relative to their distance: it comes from a board of known size
-/// that fills a tenth or so of that distance.
+/// How many times less certain a rig's scale is than its points, both relative to their distance: it comes from a board
+/// of known size that fills a tenth or so of that distance.
 const SCALE_OVER_POINT: f64 = 10.0;
 
 #[derive(Debug, Deserialize)]
@@ -51,8 +51,8 @@ struct PoseSensitivity {
     sensitivity: Vec<Vec<f64>>,
 }
 
-/// Takes the shared errors of the `measure.json` at `path` out of the rows' covariances and puts them beside the rows. Nothing is
-/// changed where the file has none, or has them for other poses.
+/// Takes the shared errors of the `measure.json` at `path` out of the rows' covariances and puts them beside the rows.
+/// Nothing is changed where the file has none, or has them for other poses.
 pub fn take(path: &Utf8Path, set: &mut Dataset) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(Measured { shared: Some(shared) }) = serde_json::from_slice(&bytes) else { return };
@@ -66,10 +66,10 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
     }
 }
 
-/// Gives points of cameras (they have orientations and covariances) whose shared errors nobody stated the one that all rigs have: an
-/// unknown scale, as uncertain as the points' own noise lets expect. A robot that is fitted to points of a wrong scale has links of a wrong
-/// length, and nothing in the residuals tells; with the scale unknown, the links' tolerance has a say. Several targets are a tracker's, whose
-/// scale is its laser's.
+/// Gives points of cameras (they have orientations and covariances) whose shared errors nobody stated the one that all
+/// rigs have: an unknown scale, as uncertain as the points' own noise lets expect. A robot that is fitted to points of
+/// a wrong scale has links of a wrong length, and nothing in the residuals tells; with the scale unknown, the links'
+/// tolerance has a say. Several targets are a tracker's, whose scale is its laser's.
 pub fn suppose_scale(set: &mut Dataset) {
     let is_stated = set.poses.iter().all(|pose| pose.reading.covariance_mm2().is_some());
     if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !is_stated {
@@ -87,7 +87,8 @@ pub fn suppose_scale(set: &mut Dataset) {
     set.supposed_scale = Some(scale);
 }
 
-/// What the sensor leaves unknown: the errors that all rows share, or the zero of distances to a centre; and how a body is turned.
+/// What the sensor leaves unknown: the errors that all rows share, or the zero of distances to a centre; and how a body
+/// is turned.
 pub fn unknowns(set: &Dataset, settings: &Settings) -> Vec<Extra> {
     let own = match set.shared.first() {
         Some(shared) => (0..shared.ncols()).map(Extra::Shared).collect(),

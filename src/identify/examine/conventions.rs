@@ -1,12 +1,14 @@
-//! Hypotheses about what is wrong with the data before anything is identified: units, exchanged or negated joints, another convention.
+//! Hypotheses about what is wrong with the data before anything is identified: units, exchanged or negated joints,
+//! another convention.
 //!
-//! In: a data set and the nominal robot. Out: both as the best hypothesis has them, and its name. Two things prove a hypothesis. A good
-//! robot fits to well below a millimetre whatever its errors of manufacture are: where a robust fit leaves more, a hypothesis that makes
-//! the errors vanish is taken. And a robot is built after its file: where joints move little a fit swallows nearly everything, but then a
-//! hypothesis under which the nominal robot itself is near the readings, and which fits as well, is taken. Nothing is mended that neither
-//! proves, and nothing that sessions along the rows explain better.
-//! What goes wrong: two faults at once are found one after the other only where each alone brings an improvement. What the target's
-//! unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
+//! In: a data set and the nominal robot. Out: both as the best hypothesis has them, and its name. Two things prove a
+//! hypothesis. A good robot fits to well below a millimetre whatever its errors of manufacture are: where a robust fit
+//! leaves more, a hypothesis that makes the errors vanish is taken. And a robot is built after its file: where joints
+//! move little a fit swallows nearly everything, but then a hypothesis under which the nominal robot itself is near the
+//! readings, and which fits as well, is taken. Nothing is mended that neither proves, and nothing that sessions along
+//! the rows explain better. What goes wrong: two faults at once are found one after the other only where each alone
+//! brings an improvement. What the target's unknown place undoes (the sign of the last joint with a target on its axis)
+//! is not seen and costs nothing.
 
 use std::iter;
 
@@ -28,11 +30,12 @@ pub const IMPLAUSIBLE_MM: f64 = 0.8;
 /// A hypothesis explains what is wrong when it brings errors down by this factor.
 const EXPLAINS: f64 = 4.0;
 
-/// Where errors do not vanish, the factors by which nominal robot and fit come nearer to the readings must be this together.
+/// Where errors do not vanish, the factors by which nominal robot and fit come nearer to the readings must be this
+/// together.
 const NEARER: f64 = 6.0;
 
-/// By what factor the nominal robot comes nearer where the fit may get worse; each time that it gets worse by some factor asks for the
-/// fourth power of that.
+/// By what factor the nominal robot comes nearer where the fit may get worse; each time that it gets worse by some
+/// factor asks for the fourth power of that.
 const STRIKING: f64 = 50.0;
 
 /// Errors of the nominal robot, mm, below which its file is not doubted.
@@ -41,7 +44,8 @@ const DOUBTED_MM: f64 = 0.5;
 /// A fit whose scatter is within this factor of another's is as good.
 const AS_GOOD: f64 = 1.2;
 
-/// Of hypotheses whose fits are within this factor of the best, that with the nominal robot nearest to the readings is the likelier.
+/// Of hypotheses whose fits are within this factor of the best, that with the nominal robot nearest to the readings is
+/// the likelier.
 const ALIKE: f64 = 2.0;
 
 /// Hypotheses whose errors differ by less than this share, which is what fits end within, are one robot in other words.
@@ -204,7 +208,8 @@ impl Misfit {
         let hopeless_mm = to_be_beaten.map_or(f64::INFINITY, |now| now.nominal);
         let nominal = task(&[]).unfitted_mm(hopeless_mm);
         let mut misfit = Misfit { nominal, target: f64::INFINITY, fitted: f64::INFINITY };
-        // Only where the file has the target in another place can the links be right and the robot as a whole be far off.
+        // Only where the file has the target in another place can the links be right and the robot as a whole be far
+        // off.
         if to_be_beaten.is_some_and(|now| now.target * EXPLAINS >= now.nominal && !misfit.is_nearer(now)) {
             return None;
         }
@@ -221,7 +226,8 @@ impl Misfit {
         Misfit { nominal: self.nominal / factor, target: self.target / factor, fitted: self.fitted / factor }
     }
 
-    /// Whose errors fall, mm: from what they were now to these, which are in the file's unit. That unit is so many times what it was said to be.
+    /// Whose errors fall, mm: from what they were now to these, which are in the file's unit. That unit is so many
+    /// times what it was said to be.
     fn fallen(&self, now: &Misfit, factor: f64) -> (&'static str, f64, f64) {
         let (whose, from, to) = match self.fitted * EXPLAINS < now.fitted {
             true => ("the errors", now.fitted, self.fitted),
@@ -231,7 +237,8 @@ impl Misfit {
         (whose, from, to * factor)
     }
 
-    /// Whether two hypotheses are one and the same robot in other words, as a shoulder turned over and a base that turns the other way.
+    /// Whether two hypotheses are one and the same robot in other words, as a shoulder turned over and a base that
+    /// turns the other way.
     fn is_the_same(&self, other: &Misfit) -> bool {
         let pairs = [(self.nominal, other.nominal), (self.target, other.target), (self.fitted, other.fitted)];
         pairs.iter().all(|(a, b)| (a - b).abs() <= SAME * b)
@@ -253,8 +260,9 @@ impl Misfit {
         if now.fitted >= IMPLAUSIBLE_MM {
             return better > EXPLAINS;
         }
-        // Of some sixty hypotheses one that is wrong brings distances with few poses nearer by four or five times. None that is wrong
-        // brings the file's robot nearer by a hundred, and where joints move little what is wrong may even fit a little better.
+        // Of some sixty hypotheses one that is wrong brings distances with few poses nearer by four or five times. None
+        // that is wrong brings the file's robot nearer by a hundred, and where joints move little what is wrong may
+        // even fit a little better.
         let nearer = self.nearer(now);
         let striking = better * ALIKE >= 1.0 && nearer * better.powi(4) > STRIKING;
         striking || better * AS_GOOD >= 1.0 && nearer > EXPLAINS && nearer * better > NEARER

@@ -1,11 +1,12 @@
 //! Groups whose covariances do not go with their residuals as those of the other groups do.
 //!
-//! In: a data set whose readings state covariances, and the nominal robot. Out: the same set with the covariances of such groups brought
-//! to what their residuals are, and a sentence for each. It comes before gross errors are looked for: the rows of a group that promises
-//! too much would be taken for them. A robust fit in which all groups count alike says how large each group's residuals are; they should
-//! be what the group states and a scatter that all groups have. A group is off where the data are clearly more probable without that.
-//! What goes wrong: with groups of fifteen poses, factors below three are as probable as some more scatter of the robot; where half of
-//! the groups or more are off, the others seem to be.
+//! In: a data set whose readings state covariances, and the nominal robot. Out: the same set with the covariances of
+//! such groups brought to what their residuals are, and a sentence for each. It comes before gross errors are looked
+//! for: the rows of a group that promises too much would be taken for them. A robust fit in which all groups count
+//! alike says how large each group's residuals are; they should be what the group states and a scatter that all groups
+//! have. A group is off where the data are clearly more probable without that. What goes wrong: with groups of fifteen
+//! poses, factors below three are as probable as some more scatter of the robot; where half of the groups or more are
+//! off, the others seem to be.
 
 use std::collections::BTreeMap;
 
@@ -51,8 +52,8 @@ struct Seen {
     numbers: f64,
 }
 
-/// A group whose covariances are off: its residuals are so many times as large as they should be, and its covariances say so when they
-/// are multiplied by the factor.
+/// A group whose covariances are off: its residuals are so many times as large as they should be, and its covariances
+/// say so when they are multiplied by the factor.
 #[derive(Debug, Clone, PartialEq)]
 struct Off {
     name: String,
@@ -120,8 +121,8 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
     Ok(stated.iter().filter_map(of_group).collect())
 }
 
-/// Mean square of a number of which each of these is a sum of so many, large ones bounded (an M-estimate of scale: Huber, "Robust
-/// statistics", 1981, section 5.2).
+/// Mean square of a number of which each of these is a sum of so many, large ones bounded (an M-estimate of scale:
+/// Huber, "Robust statistics", 1981, section 5.2).
 fn bounded_square(squares: &[f64], numbers: usize) -> Option<f64> {
     let n = numbers as f64;
     let (of_squares, of_larger) = (ChiSquared::new(n).ok()?, ChiSquared::new(n + 2.0).ok()?);
@@ -197,8 +198,8 @@ mod tests {
 
     const NOISE_MM: f64 = 0.02;
 
-    /// What is said of points whose covariances are off by this factor of a standard deviation in group g1 and by that in all groups,
-    /// and the ratio of the first group's variance to the second's as they are used.
+    /// What is said of points whose covariances are off by this factor of a standard deviation in group g1 and by that
+    /// in all groups, and the ratio of the first group's variance to the second's as they are used.
     fn examined(of_group: f64, of_all: f64) -> (Vec<String>, f64) {
         let world = synthetic::world(120, NOISE_MM, 4);
         let mut rows = world.rows.clone();

@@ -1,4 +1,5 @@
-//! What may be wrong with the units and conventions of a data set or of a robot's file, one fault at a time, and how both are without it.
+//! What may be wrong with the units and conventions of a data set or of a robot's file, one fault at a time, and how
+//! both are without it.
 
 use nalgebra::{Rotation3, Vector3};
 
@@ -96,7 +97,8 @@ impl Hypothesis {
         if let Hypothesis::Lengths(factor, ..) = self { factor } else { 1.0 }
     }
 
-    /// Whether all that it is about stands still in the set: the tool's place then undoes what it says as well as it can say it.
+    /// Whether all that it is about stands still in the set: the tool's place then undoes what it says as well as it
+    /// can say it.
     pub fn is_of_still(self, still: &[usize]) -> bool {
         match self {
             Hypothesis::Exchanged(i, j) => still.contains(&i) && still.contains(&j),
@@ -152,8 +154,8 @@ impl Hypothesis {
         matches!(self, Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh)
     }
 
-    /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot file; a table that was written
-    /// otherwise than the controller counts is one of the table.
+    /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot
+    /// file; a table that was written otherwise than the controller counts is one of the table.
     pub fn mend(self) -> String {
         match self {
             Hypothesis::Negated(i) => {

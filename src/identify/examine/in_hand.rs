@@ -1,9 +1,9 @@
 //! Cameras on the hand that look at a target which stands still: another problem than the one that is solved here.
 //!
-//! In: points, and the nominal robot. Out: an error where the points move as they would then. Method: seen from the flange the target moves as
-//! the robot backwards. The placement with most poses is fitted with the links of the file, as it is and with every pose inverted, the target and the
-//! cameras anywhere; backwards must leave far less.
-//! Goes wrong: points of so few poses that either way round fits.
+//! In: points, and the nominal robot. Out: an error where the points move as they would then. Method: seen from the
+//! flange the target moves as the robot backwards. The placement with most poses is fitted with the links of the file,
+//! as it is and with every pose inverted, the target and the cameras anywhere; backwards must leave far less. Goes
+//! wrong: points of so few poses that either way round fits.
 
 use nalgebra::Point3;
 

@@ -1,9 +1,9 @@
 //! Known distances between touched points, each held against what the touches and the other ones say.
 //!
-//! They give the robot its scale, so that one that is wrong spoils everything. In: a data set with known distances, and the nominal robot. Out: the
-//! set without those that do not go with the rest, and a sentence for each.
-//! One of another size than the nominal robot has there, a digit too few or another unit, is left out before that.
-//! What goes wrong: one distance alone has nothing to be held against, and of two that disagree nothing tells which is wrong.
+//! They give the robot its scale, so that one that is wrong spoils everything. In: a data set with known distances, and
+//! the nominal robot. Out: the set without those that do not go with the rest, and a sentence for each. One of another
+//! size than the nominal robot has there, a digit too few or another unit, is left out before that. What goes wrong:
+//! one distance alone has nothing to be held against, and of two that disagree nothing tells which is wrong.
 
 use nalgebra::{Point3, Vector3};
 
@@ -19,8 +19,8 @@ use crate::statistics::median;
 /// Standard deviations, its own and the prediction's, from which on a known distance does not go with the rest.
 const OFF: f64 = 6.0;
 
-/// Times by which a known distance and what the nominal robot has between the touched points may differ: robots are built to far less, but the file's
-/// tool may be another one. Beyond the second it is another number.
+/// Times by which a known distance and what the nominal robot has between the touched points may differ: robots are
+/// built to far less, but the file's tool may be another one. Beyond the second it is another number.
 const ALIKE: f64 = 1.7;
 const ANOTHER: f64 = 2.5;
 
@@ -96,7 +96,8 @@ fn is_within(ratio: f64, times: f64) -> bool {
     !ratio.is_finite() || (1.0 / times..=times).contains(&ratio)
 }
 
-/// Each known distance as a share of what the nominal robot has between the middles of the touches, those to verify among them.
+/// Each known distance as a share of what the nominal robot has between the middles of the touches, those to verify
+/// among them.
 fn ratios(set: &Dataset, robot: &Robot) -> Vec<f64> {
     let rows = set.rows(|_| true);
     let middle = |group: usize| {
@@ -111,8 +112,8 @@ fn name(set: &Dataset, k: &KnownDistance) -> String {
     format!("{} to {}", set.groups[k.a].name, set.groups[k.b].name)
 }
 
-/// The fitted touches without those that are gross errors among the touches themselves, which would speak against the known distances of
-/// their sockets.
+/// The fitted touches without those that are gross errors among the touches themselves, which would speak against the
+/// known distances of their sockets.
 fn trusted(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<usize>, Error> {
     let alone = Dataset { known: Vec::new(), ..set.clone() };
     let (mut rows, parameters) = (set.fit_rows(), robot.mdh_parameters());

@@ -1,4 +1,5 @@
-//! What is wrong with the data, asked before anything is identified: each question is answered with the data mended and a sentence.
+//! What is wrong with the data, asked before anything is identified: each question is answered with the data mended and
+//! a sentence.
 
 mod all;
 pub mod conventions;

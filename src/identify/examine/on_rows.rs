@@ -1,8 +1,9 @@
 //! What is wrong between a table and a robot that is to stay as its file has it, mended in the table.
 //!
-//! In: a set, and a robot as it is and as it was mended. Out: the set with joints that this robot takes as the mended one takes those of the table.
-//! Of several robots each takes the rows as it counts its joints. And, for a robot whose accuracy is known, what brings the rows back to it: units,
-//! signs and columns. Goes wrong: links that were mended are no matter of the rows; a robot that changed and rows in other conventions at once.
+//! In: a set, and a robot as it is and as it was mended. Out: the set with joints that this robot takes as the mended
+//! one takes those of the table. Of several robots each takes the rows as it counts its joints. And, for a robot whose
+//! accuracy is known, what brings the rows back to it: units, signs and columns. Goes wrong: links that were mended are
+//! no matter of the rows; a robot that changed and rows in other conventions at once.
 
 use rayon::prelude::*;
 
@@ -22,7 +23,8 @@ const NEARER: f64 = 4.0;
 /// Times what 95 % of its errors are below, within which rows are those of a robot.
 const WITHIN: f64 = 2.0;
 
-/// The rows as the robot takes them, where the mended one differs by signs and zeros of joints alone; `None` where links differ.
+/// The rows as the robot takes them, where the mended one differs by signs and zeros of joints alone; `None` where
+/// links differ.
 pub fn mended(set: &Dataset, robot: &Robot, mended: &Robot) -> Option<Dataset> {
     let mut same_links = mended.clone();
     for (joint, own) in same_links.joints.iter_mut().zip(&robot.joints) {
@@ -42,14 +44,15 @@ pub fn mended(set: &Dataset, robot: &Robot, mended: &Robot) -> Option<Dataset> {
     Some(set)
 }
 
-/// How far a robot is off the rows as it is, with nothing but the sensor placed: mm a coordinate, or the first figure beyond `hopeless_mm`.
+/// How far a robot is off the rows as it is, with nothing but the sensor placed: mm a coordinate, or the first figure
+/// beyond `hopeless_mm`.
 fn left_mm(set: &Dataset, robot: &Robot, settings: &Settings, hopeless_mm: f64) -> f64 {
     let rows = set.fit_rows();
     Task::plain(set, robot, &[], &rows, settings).unfitted_mm(hopeless_mm)
 }
 
-/// The rows as a robot takes them: those that were mended for another one, or where it counts its joints as they are written, these. A robot that was
-/// identified from such rows has their signs and zeros in its file.
+/// The rows as a robot takes them: those that were mended for another one, or where it counts its joints as they are
+/// written, these. A robot that was identified from such rows has their signs and zeros in its file.
 pub fn taken<'a>(written: &'a Dataset, mended: &'a Dataset, robot: &Robot, settings: &Settings) -> &'a Dataset {
     let [as_written, as_mended] = [written, mended].map(|set| left_mm(set, robot, settings, f64::INFINITY));
     if NEARER * as_written < as_mended { written } else { mended }

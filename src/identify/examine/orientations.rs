@@ -1,10 +1,12 @@
-//! What is wrong with the orientations of points: degrees for radians, angles about axes for a rotation vector, the inverse rotation.
+//! What is wrong with the orientations of points: degrees for radians, angles about axes for a rotation vector, the
+//! inverse rotation.
 //!
-//! In: a data set and the nominal robot. Out: the set as the best hypothesis has it, and its name. The turn of the target between two
-//! poses of a placement is that of the flange, about an axis that stands in the sensor's frame as the flange's does in the base: one rotation
-//! brings all axes together (Wahba, 1965), whatever the sensor's frame and the target's are. Where none does, each hypothesis is tried, and the one
-//! with which they agree is taken; each placement by itself where it has enough poses.
-//! What goes wrong: where all turns are about one axis, an inverse rotation is not told from the rotation.
+//! In: a data set and the nominal robot. Out: the set as the best hypothesis has it, and its name. The turn of the
+//! target between two poses of a placement is that of the flange, about an axis that stands in the sensor's frame as
+//! the flange's does in the base: one rotation brings all axes together (Wahba, 1965), whatever the sensor's frame and
+//! the target's are. Where none does, each hypothesis is tried, and the one with which they agree is taken; each
+//! placement by itself where it has enough poses. What goes wrong: where all turns are about one axis, an inverse
+//! rotation is not told from the rotation.
 
 use std::f64::consts::PI;
 
@@ -22,8 +24,8 @@ const IMPLAUSIBLE_RAD: f64 = 0.05;
 /// A hypothesis explains what is wrong when it brings the difference down by this factor.
 const EXPLAINS: f64 = 4.0;
 
-/// Median of the length of a vector whose three components are normal, over that of the size of one of them: what noise alone makes of turns
-/// about axes beside the turns' sizes.
+/// Median of the length of a vector whose three components are normal, over that of the size of one of them: what noise
+/// alone makes of turns about axes beside the turns' sizes.
 const OF_NOISE: f64 = 1.538 / 0.6745;
 
 /// Pairs of poses that are enough to tell, and poses of a placement that tell by themselves.
@@ -71,7 +73,8 @@ enum Told {
     Contradict(f64),
 }
 
-/// The set with orientations that go with the joints, and what was wrong with them. Those that don't are left out unless they are `asked` for.
+/// The set with orientations that go with the joints, and what was wrong with them. Those that don't are left out
+/// unless they are `asked` for.
 pub fn examine(set: &Dataset, robot: &Robot, asked: bool) -> (Dataset, Vec<Finding>) {
     let mut set = set.clone();
     let all: Vec<usize> = (0..set.groups.len()).collect();
@@ -162,8 +165,8 @@ fn mend(set: &mut Dataset, groups: &[usize], told: Told, asked: bool) -> Option<
     }
 }
 
-/// Several targets count with their turn; a pose whose turn is another one is left out. Their lengths don't tell the names of targets that
-/// stand alike, of an even triangle say, but turned by the exchange they are.
+/// Several targets count with their turn; a pose whose turn is another one is left out. Their lengths don't tell the
+/// names of targets that stand alike, of an even triangle say, but turned by the exchange they are.
 fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Option<Finding>) {
     if set.targets.is_none() {
         return (set, None);
@@ -195,8 +198,8 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
     (set.without(&turned, "the targets are turned otherwise than the flange"), Some(finding))
 }
 
-/// Median difference between the target's turn from pose to pose and the flange's, rad: of its size alone, and of the whole turn in the frame that
-/// brings the axes together; `None` without orientations in two poses of one group.
+/// Median difference between the target's turn from pose to pose and the flange's, rad: of its size alone, and of the
+/// whole turn in the frame that brings the axes together; `None` without orientations in two poses of one group.
 fn difference_rad(set: &Dataset, robot: &Robot, groups: &[usize], reader: Reader) -> Option<[f64; 2]> {
     let oriented = |row: usize| set.poses[row].reading.rotation_rad().map(reader);
     let flange = |row: usize| robot.base_from_flange(&set.poses[row].joints_rad).rotation;

@@ -1,14 +1,15 @@
-//! Sessions along the rows of a group: the sensor, the socket, the wire's anchor or the robot's base was moved, and nobody wrote it down.
+//! Sessions along the rows of a group: the sensor, the socket, the wire's anchor or the robot's base was moved, and
+//! nobody wrote it down.
 //!
-//! In: a set of points or of distances, in the order of measurement. Out: the same set with each group cut where a
-//! new placement explains the rest of its rows better, and what drifts. Distances to a centre that was measured before everything moved
-//! are distances to a point that is unknown. Cuts are made one at a time at the row of greatest gain (binary
-//! segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the cut's unknowns.
-//! Influence is bounded (weights of least absolute residuals), so that single gross errors make no session; for points, touches and distances to
-//! a centre, whose model errors are as smooth in the order of a grid as a drift is in time, the same rows sorted by each joint must not be
-//! cut as well. What moves evenly may be the zero of a joint as well as the sensor: of both, and of steps of both, the likeliest is named, and with
-//! it what explains the rows alike.
-//! A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
+//! In: a set of points or of distances, in the order of measurement. Out: the same set with each group cut where a new
+//! placement explains the rest of its rows better, and what drifts. Distances to a centre that was measured before
+//! everything moved are distances to a point that is unknown. Cuts are made one at a time at the row of greatest gain
+//! (binary segmentation: Vostrikova, 1981) as long as the Bayesian information criterion (Schwarz, 1978) pays for the
+//! cut's unknowns. Influence is bounded (weights of least absolute residuals), so that single gross errors make no
+//! session; for points, touches and distances to a centre, whose model errors are as smooth in the order of a grid as a
+//! drift is in time, the same rows sorted by each joint must not be cut as well. What moves evenly may be the zero of a
+//! joint as well as the sensor: of both, and of steps of both, the likeliest is named, and with it what explains the
+//! rows alike. A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket four touches, are not seen.
 
 mod drift;
@@ -45,7 +46,8 @@ const SHORTEST_TOUCH: usize = 4;
 const SHARE: f64 = 0.1;
 const BEATS: f64 = 1.3;
 
-/// Robust standard deviations from which on a row counts no more the farther it is off: a few that are off by metres would hide a step.
+/// Robust standard deviations from which on a row counts no more the farther it is off: a few that are off by metres
+/// would hide a step.
 const GROSS: f64 = 8.0;
 
 /// Most cuts; data that want more are no sessions.
@@ -71,7 +73,7 @@ pub struct Along {
     pub drifting: Vec<String>,
     /// Rows that are not of one robot; whatever else a fit to all of them finds follows from that.
     pub robots: Option<Finding>,
-    /// Said instead of a sensor that moved between the sessions, or drifts, where a tool or a joint that did is as likely.
+    /// Said instead of a sensor that moved or drifts, where a tool or a joint that did is as likely.
     pub instead: Option<Finding>,
 }
 
@@ -118,8 +120,8 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     (cut, along)
 }
 
-/// How a search looks at rows that are far off. Gross errors hide small steps, but rows are far off beside a large step as well: only where
-/// nothing is found any more are they held down, and at last left out.
+/// How a search looks at rows that are far off. Gross errors hide small steps, but rows are far off beside a large step
+/// as well: only where nothing is found any more are they held down, and at last left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Look {
     Uncapped,
@@ -235,7 +237,7 @@ impl<'a> Search<'a> {
         0.5 * (self.freedom * (self.squares / left).ln() - unknowns as f64 * self.numbers.ln())
     }
 
-    /// The row of the set at which a new session pays most, if any does. In groups that are known to drift it need not beat cuts along joints.
+    /// The row at which a new session pays most, if any does. In groups known to drift it need not beat joints' cuts.
     fn best_cut(&self, drifting: &[String]) -> Option<usize> {
         let mut best: Option<(f64, usize, &Placed)> = None;
         for placed in &self.placed {
@@ -302,7 +304,7 @@ impl<'a> Search<'a> {
         if !ramps.iter().any(|(_, holds, _)| *holds) {
             return None;
         }
-        // What moves evenly is half explained by a step, and a step by what moves evenly. Where the sensor steps, its rows are cut.
+        // What moves evenly is half explained by a step, and the reverse. Where the sensor steps, its rows are cut.
         let steps = placed.causes().filter(|(joint, _)| !is_cut && joint.is_some());
         let steps = steps.filter_map(|(joint, fresh)| self.step(placed, joint, fresh, &order));
         let mut all: Vec<(f64, Moves)> =

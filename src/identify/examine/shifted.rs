@@ -1,11 +1,13 @@
-//! Points and joint angles that do not belong together: from some row on each point is of another row's pose, as after a picture that failed.
+//! Points and joint angles that do not belong together: from some row on each point is of another row's pose, as after
+//! a picture that failed.
 //!
-//! In: points in the order of the file, and the nominal robot. Out: the set with each reading at the row that it is of, from which row on, and
-//! by how many rows. Every row and every shift by up to `MOST` is tried with the links of the file, placements and the target's place fitted
-//! (least sum of distances, by reweighting). A shift is named where the rows behind it come nearer by a factor, the likelihood of all rows
-//! pays for the search, and another placement of these rows does not explain them as well.
-//! What goes wrong: groups of three rows or so, whose placements take up what is wrong; neighbouring poses that are nearer to each other than the nominal robot is to the readings; fewer than `FEWEST` rows behind
-//! the shift; rows that were left out between count as none.
+//! In: points in the order of the file, and the nominal robot. Out: the set with each reading at the row that it is of,
+//! from which row on, and by how many rows. Every row and every shift by up to `MOST` is tried with the links of the
+//! file, placements and the target's place fitted (least sum of distances, by reweighting). A shift is named where the
+//! rows behind it come nearer by a factor, the likelihood of all rows pays for the search, and another placement of
+//! these rows does not explain them as well. What goes wrong: groups of three rows or so, whose placements take up what
+//! is wrong; neighbouring poses that are nearer to each other than the nominal robot is to the readings; fewer than
+//! `FEWEST` rows behind the shift; rows that were left out between count as none.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;
@@ -260,7 +262,8 @@ mod tests {
     use crate::identify::synthetic;
     use crate::measurements::Measurement;
 
-    /// Moves the readings from a row on, as if pictures had failed or one had been taken twice: each is of the pose `by` rows further down.
+    /// Moves the readings from a row on, as if pictures had failed or one had been taken twice: each is of the pose
+    /// `by` rows further down.
     fn planted(rows: &[Measurement], from: usize, by: isize) -> Vec<Measurement> {
         let of = |(i, row): (usize, &Measurement)| {
             let pose = if i < from { Some(i) } else { i.checked_add_signed(by) };

@@ -1,13 +1,14 @@
 //! Cross-validation of a whole ladder of models from one linearisation.
 //!
-//! In: rows linearised where a rich model fits them, for all parameters that any model has. The rows of each placement are cut into
-//! regions of joint space; a cell is a region of a placement. Whole placements are held out where there are three or more, else regions:
-//! a model is judged where it was not fitted, not between its own rows. Poses that turn one axis after the other leave a region that is held
-//! out to pure extrapolation; so rows are also held out here and there (see [`super::folds`]), and what is worth it by either counts. Each cell keeps the product of its white columns (parameters,
-//! placement, residual) with themselves; every model on every fold is then algebra on small matrices, so that the ladder costs next to
-//! nothing and is linear in rows and placements. No draw is made: the choice depends on no seed.
-//! What goes wrong: a model whose parameters move the target by so much that a linear model does not hold; nominal errors of 5 mm on a
-//! metre leave some hundredths.
+//! In: rows linearised where a rich model fits them, for all parameters that any model has. The rows of each placement
+//! are cut into regions of joint space; a cell is a region of a placement. Whole placements are held out where there
+//! are three or more, else regions: a model is judged where it was not fitted, not between its own rows. Poses that
+//! turn one axis after the other leave a region that is held out to pure extrapolation; so rows are also held out here
+//! and there (see [`super::folds`]), and what is worth it by either counts. Each cell keeps the product of its white
+//! columns (parameters, placement, residual) with themselves; every model on every fold is then algebra on small
+//! matrices, so that the ladder costs next to nothing and is linear in rows and placements. No draw is made: the choice
+//! depends on no seed. What goes wrong: a model whose parameters move the target by so much that a linear model does
+//! not hold; nominal errors of 5 mm on a metre leave some hundredths.
 
 use std::collections::BTreeSet;
 
@@ -52,7 +53,8 @@ struct Cell {
 struct Fold {
     normal: DMatrix<f64>,
     gradient: DVector<f64>,
-    /// How the unknowns of each placement follow the parameters and the constant one behind them, from what is fitted of it.
+    /// How the unknowns of each placement follow the parameters and the constant one behind them, from what is fitted
+    /// of it.
     follows: Vec<Option<DMatrix<f64>>>,
 }
 
@@ -133,8 +135,8 @@ impl CrossValidation {
         CrossValidation::new(problem, rows, &label, &|_, region| if region < FOLDS { region } else { SKIPPED }, false)
     }
 
-    /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm and mrad, one a
-    /// parameter, and behind them one an unknown of the sensor.
+    /// What the most probable values of these parameters change by where each fold is left out, beside those of all; mm
+    /// and mrad, one a parameter, and behind them one an unknown of the sensor.
     pub fn deletions(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Vec<Option<Vec<f64>>> {
         let columns = self.columns(parameters);
         let sds = tolerance.standard_deviations(parameters, &self.extras);
@@ -151,7 +153,8 @@ impl CrossValidation {
         of_robot.chain(self.parameters.len()..self.parameters.len() + self.extras.len()).collect()
     }
 
-    /// Standard deviations of the model's parameters that make the data most probable, and the logarithm of that probability.
+    /// Standard deviations of the model's parameters that make the data most probable, and the logarithm of that
+    /// probability.
     pub fn tolerance(&self, parameters: &[Parameter]) -> (Tolerance, f64) {
         let columns = self.columns(parameters);
         let normal = self.whole.normal.select_rows(&columns).select_columns(&columns);
@@ -159,10 +162,11 @@ impl CrossValidation {
         Tolerance::from_evidence_of_all(parameters, &self.extras, &normal, &gradient)
     }
 
-    /// How many times larger the variances of the model's parameters are than errors that are independent of each other would make them:
-    /// by how much the pulls of the folds (placements, or regions of joint space) on the parameters differ, against what their residuals'
-    /// sizes let expect. Errors that many rows share, a placement's or a model's that is not quite right, pull all one way. One where it
-    /// could be chance. Source: the cluster-robust covariance of Liang and Zeger (Biometrika 73, 1986), of which this is the mean factor.
+    /// How many times larger the variances of the model's parameters are than errors that are independent of each other
+    /// would make them: by how much the pulls of the folds (placements, or regions of joint space) on the parameters
+    /// differ, against what their residuals' sizes let expect. Errors that many rows share, a placement's or a model's
+    /// that is not quite right, pull all one way. One where it could be chance. Source: the cluster-robust covariance
+    /// of Liang and Zeger (Biometrika 73, 1986), of which this is the mean factor.
     pub fn common_factor(&self, parameters: &[Parameter]) -> f64 {
         let columns = self.columns(parameters);
         let sds = self.tolerance(parameters).0.standard_deviations(parameters, &self.extras);
@@ -208,7 +212,8 @@ impl CrossValidation {
         if factor > chance.inverse_cdf(1.0 - CHANCE) / freedom { factor } else { 1.0 }
     }
 
-    /// Held-out errors of the model with these parameters, whose tolerance all rows tell; `None` where there is but one fold.
+    /// Held-out errors of the model with these parameters, whose tolerance all rows tell; `None` where there is but one
+    /// fold.
     pub fn held_out(&self, parameters: &[Parameter], tolerance: &Tolerance) -> Option<HeldOut> {
         if self.folds.len() < 2 {
             return None;
@@ -311,9 +316,9 @@ fn divide(set: &Dataset, rows: &Rows, mut poses: Vec<usize>, regions: usize, nex
     divide(set, rows, right, regions - first, next, label);
 }
 
-/// Whether `new` is clearly below `old`: its mean square is less, and by Student's test of the paired cells either the squares fall or
-/// their logarithms do. Squares say what a few bad regions gain; logarithms see that all regions gain where the old errors are of very
-/// different size.
+/// Whether `new` is clearly below `old`: its mean square is less, and by Student's test of the paired cells either the
+/// squares fall or their logarithms do. Squares say what a few bad regions gain; logarithms see that all regions gain
+/// where the old errors are of very different size.
 pub fn clearly_less(new: &HeldOut, old: &HeldOut) -> bool {
     let pairs: Vec<(f64, f64)> = new.iter().zip(old).filter(|((_, n), _)| *n > 0.0).map(|(n, o)| (n.0, o.0)).collect();
     if pairs.len() < 2 || new.len() != old.len() || root_mean(new) >= root_mean(old) {

@@ -1,8 +1,9 @@
 //! How far a robot's predictions are from what was measured, on rows that were not fitted.
 //!
-//! In: a robot, rows fitted (they place the sensor: rigid transforms, the wire's anchor, touched points), rows to judge.
-//! Out: signed distance errors to the group's reference and, with positions, point errors in the sensor's frame; for touches the
-//! distance of each predicted point to their mean. A group without fitted rows is placed by the rows that are judged.
+//! In: a robot, rows fitted (they place the sensor: rigid transforms, the wire's anchor, touched points), rows to
+//! judge. Out: signed distance errors to the group's reference and, with positions, point errors in the sensor's frame;
+//! for touches the distance of each predicted point to their mean. A group without fitted rows is placed by the rows
+//! that are judged.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -51,8 +52,8 @@ impl Spread {
 pub struct RowError {
     /// Row of the data set.
     pub row: usize,
-    /// Predicted minus measured distance to the group's reference, mm; of a touch, to the mean of its group's predicted points.
-    /// `None` for the reference itself, and for a point of a body that is not its mark point.
+    /// Predicted minus measured distance to the group's reference, mm; of a touch, to the mean of its group's predicted
+    /// points. `None` for the reference itself, and for a point of a body that is not its mark point.
     pub distance_mm: Option<f64>,
     /// Predicted minus measured point, mm, in the sensor's frame; of a touch, from the mean.
     pub point_mm: Option<Vector3<f64>>,
@@ -83,7 +84,8 @@ pub struct Judge<'a> {
     pub extras: &'a [(Extra, f64)],
 }
 
-/// Weight of the placement's points where no fit has said anything else: covariances matter where they are larger than this, mm.
+/// Weight of the placement's points where no fit has said anything else: covariances matter where they are larger than
+/// this, mm.
 const PLACING_SCATTER_MM: f64 = 1.0;
 
 impl<'a> Judge<'a> {
@@ -125,8 +127,8 @@ impl<'a> Judge<'a> {
         (task.rows_at(self.scatter, robot), values)
     }
 
-    /// A predicted and a measured point, the sensor's own errors taken off, and its covariance; `flange_from_body` is how a body of several
-    /// targets is turned.
+    /// A predicted and a measured point, the sensor's own errors taken off, and its covariance; `flange_from_body` is
+    /// how a body of several targets is turned.
     fn point(
         &self,
         robot: &Robot,
@@ -193,7 +195,8 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Touches are judged by the mean of the judged rows themselves: the socket of a robot that is off is not where the fitted rows say.
+    /// Touches are judged by the mean of the judged rows themselves: the socket of a robot that is off is not where the
+    /// fitted rows say.
     fn of_touches(&self, rows: &[usize], predicted: &dyn Fn(usize) -> Point3<f64>, list: &mut Vec<RowError>) {
         let mean = rows.iter().map(|&r| predicted(r).coords).sum::<Vector3<f64>>() / rows.len() as f64;
         for &row in rows {

@@ -1,7 +1,8 @@
 //! Which rows are held out together: every pose once in each repeat, in five parts of all placements alike.
 //!
-//! In: rows. Out: for each repeat the fold of each row. Rows with the same joints are in one fold, or one would tell of the other; centres, which
-//! their group's distances are measured from, are in none. The draws are the same in every run: no seed of the user's changes them.
+//! In: rows. Out: for each repeat the fold of each row. Rows with the same joints are in one fold, or one would tell of
+//! the other; centres, which their group's distances are measured from, are in none. The draws are the same in every
+//! run: no seed of the user's changes them.
 
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

@@ -1,9 +1,10 @@
 //! How long errors are whose covariances are known.
 //!
-//! In: the covariance of the error at each pose. Out: the mean length, the one at the worst pose, and the length that nineteen of twenty stay below.
-//! Method: the squared length of a vector of normal numbers is nearly a multiple of a chi-squared variable of one to three degrees of freedom, with
-//! its mean and variance (Satterthwaite, 1946): an error that goes one way has longer tails than one that goes all ways. Where the size of the
-//! covariances follows from few residuals, the squared length over it is Fisher's instead. Over the poses the probabilities are averaged.
+//! In: the covariance of the error at each pose. Out: the mean length, the one at the worst pose, and the length that
+//! nineteen of twenty stay below. Method: the squared length of a vector of normal numbers is nearly a multiple of a
+//! chi-squared variable of one to three degrees of freedom, with its mean and variance (Satterthwaite, 1946): an error
+//! that goes one way has longer tails than one that goes all ways. Where the size of the covariances follows from few
+//! residuals, the squared length over it is Fisher's instead. Over the poses the probabilities are averaged.
 
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,11 @@
 //! Where the sensor stands and the target sits, with a robot that is taken as it is.
 //!
-//! In: points, orientations where there are any, a robot, and what is known of how it scatters. Out: the placements, the chi-squared of the fit
-//! against what is stated of readings and robot, and covariances that hold for few poses: a scatter that these poses themselves had to tell is
-//! made larger by Student's quantile over the normal one. What an identification left open of the robot is part of them: all poses share it, and
-//! placements and target follow it. Without orientations, and where the points leave the target's place open, it is held
-//! as the robot's file has it. One row without which the others agree is named and left out. Goes wrong: poses that leave a direction open are refused
+//! In: points, orientations where there are any, a robot, and what is known of how it scatters. Out: the placements,
+//! the chi-squared of the fit against what is stated of readings and robot, and covariances that hold for few poses: a
+//! scatter that these poses themselves had to tell is made larger by Student's quantile over the normal one. What an
+//! identification left open of the robot is part of them: all poses share it, and placements and target follow it.
+//! Without orientations, and where the points leave the target's place open, it is held as the robot's file has it. One
+//! row without which the others agree is named and left out. Goes wrong: poses that leave a direction open are refused
 //! with that direction; a robot that is wrong in a way that a placement can take up is not seen.
 
 mod agreement;
@@ -79,7 +80,8 @@ pub struct Fit {
     pub contradicted: bool,
     /// Whether they miss the robot by more than is known of it, and nothing tells whether robot or instrument is off.
     pub doubted: bool,
-    /// Whether what an identification left open of the robot is in the covariances; else the robot is taken as exact but for its scatter.
+    /// Whether what an identification left open of the robot is in the covariances; else the robot is taken as exact
+    /// but for its scatter.
     pub robot_uncertain: bool,
 }
 
@@ -191,9 +193,9 @@ fn fitted(task: &Task, trust: Trust, open: Option<&LeftOpen>) -> Result<Located,
     Ok(Located { placed, fit })
 }
 
-/// Rows, offsets and their covariance of a fit with a robot that was held, with what is open of the robot before the unknowns that were fitted: these
-/// follow it. What only moves the whole robot is what a placement is, and what only moves the target on the flange is the target's where that is
-/// fitted: neither is open.
+/// Rows, offsets and their covariance of a fit with a robot that was held, with what is open of the robot before the
+/// unknowns that were fitted: these follow it. What only moves the whole robot is what a placement is, and what only
+/// moves the target on the flange is the target's where that is fitted: neither is open.
 fn with_robot(
     task: &Task,
     (rows, offsets, fitted): (Rows, Vec<f64>, DMatrix<f64>),
@@ -223,7 +225,8 @@ fn with_robot(
     (rows, offsets, covariance)
 }
 
-/// By how much variances that so many degrees of freedom told are to be larger, that intervals of 1.96 standard deviations hold.
+/// By how much variances that so many degrees of freedom told are to be larger, that intervals of 1.96 standard
+/// deviations hold.
 fn student(freedom: f64) -> f64 {
     let quantile = StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(NORMAL_95, |t| t.inverse_cdf(0.975));
     (quantile / NORMAL_95).powi(2)

@@ -1,8 +1,9 @@
 //! Whether what a fit leaves follows the joints, or scatters.
 //!
-//! In: a fit and its data set. Out: whether further columns, the sine and the cosine of each joint for each number of a reading, explain more of
-//! the residuals than chance does (an F test: the fit is nested in the one with these columns). Readings that scatter, however much, know nothing
-//! of the joints; a robot that is not the file's leaves errors that turn with them. Goes wrong: with few rows a pattern is not told from scatter.
+//! In: a fit and its data set. Out: whether further columns, the sine and the cosine of each joint for each number of a
+//! reading, explain more of the residuals than chance does (an F test: the fit is nested in the one with these
+//! columns). Readings that scatter, however much, know nothing of the joints; a robot that is not the file's leaves
+//! errors that turn with them. Goes wrong: with few rows a pattern is not told from scatter.
 
 use std::iter;
 
@@ -43,7 +44,8 @@ pub fn is_scatter(formulation: &Formulation, set: &Dataset) -> bool {
     FisherSnedecor::new(explaining, left).is_ok_and(|law| law.cdf(gain) < 1.0 - FALSE_ALARM)
 }
 
-/// Sine and cosine of each joint (of one that slides its way and the square of it), for each number of a pose's reading.
+/// Sine and cosine of each joint (of one that slides its way and the square of it), for each number of a pose's
+/// reading.
 fn columns(placement: &Placement, formulation: &Formulation, set: &Dataset, count: usize) -> DMatrix<f64> {
     let mut columns = DMatrix::zeros(placement.poses.len(), count);
     for (place, at) in placement.by_pose() {

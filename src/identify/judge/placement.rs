@@ -1,12 +1,14 @@
-//! Where the sensor stands in each placement and where the target sits on the flange, with the covariance of all of it together.
+//! Where the sensor stands in each placement and where the target sits on the flange, with the covariance of all of it
+//! together.
 //!
-//! In: the rows of a fit with positions, the offsets of the robot that was found, and their covariance. Out: `sensor_from_base` of each group,
-//! the target's place, and for any joints the point that the robot shows there in the sensor's frame, with its covariance. Method: the
-//! placements' own unknowns follow the shared ones (robot, sensor, target) as the linearised problem says, so that what is uncertain of the
-//! robot is uncertain of the placement with it. What only moves the whole robot, or only the target on the flange, is what a placement is: it
-//! is held as the robot's file has it ([`is_held`]). Readings are taken as they are read: the sensor's own errors (its scale, a calibration's)
-//! were found beside the robot, and the placements are fitted to readings that still have them. Goes wrong: errors that the rows share and
-//! nobody stated are in none of it.
+//! In: the rows of a fit with positions, the offsets of the robot that was found, and their covariance. Out:
+//! `sensor_from_base` of each group, the target's place, and for any joints the point that the robot shows there in the
+//! sensor's frame, with its covariance. Method: the placements' own unknowns follow the shared ones (robot, sensor,
+//! target) as the linearised problem says, so that what is uncertain of the robot is uncertain of the placement with
+//! it. What only moves the whole robot, or only the target on the flange, is what a placement is: it is held as the
+//! robot's file has it ([`is_held`]). Readings are taken as they are read: the sensor's own errors (its scale, a
+//! calibration's) were found beside the robot, and the placements are fitted to readings that still have them. Goes
+//! wrong: errors that the rows share and nobody stated are in none of it.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Point3, Vector3};
 
@@ -22,7 +24,8 @@ use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::jacobian::RAD_PER_MRAD;
 use crate::robot::{Parameter, Robot};
 
-/// Whether a parameter of a robot with so many joints does nothing but move the whole robot, or the target on its flange.
+/// Whether a parameter of a robot with so many joints does nothing but move the whole robot, or the target on its
+/// flange.
 pub fn is_held(parameter: Parameter, joints: usize) -> bool {
     use Parameter::{A, Alpha, D, Theta};
     match parameter {
@@ -53,7 +56,8 @@ impl Uncertain {
         self.moved(first * self.transform, &rotation_matrix(first), Matrix3::zeros())
     }
 
-    /// Another transform, whose turn and shift change by `turn` times those of this one, the shift by `swing` times the turn beside.
+    /// Another transform, whose turn and shift change by `turn` times those of this one, the shift by `swing` times the
+    /// turn beside.
     fn moved(&self, transform: Transform, turn: &Matrix3<f64>, swing: Matrix3<f64>) -> Uncertain {
         let mut moves = Matrix6::zeros();
         moves.fixed_view_mut::<3, 3>(0, 0).copy_from(turn);
@@ -66,7 +70,8 @@ impl Uncertain {
 /// All placements of a set.
 #[derive(Debug, Clone)]
 pub struct Placed {
-    /// Index of the group and `sensor_from_base`, group by group; base and sensor frames as the readings and the chain have them.
+    /// Index of the group and `sensor_from_base`, group by group; base and sensor frames as the readings and the chain
+    /// have them.
     pub groups: Vec<(usize, Transform)>,
     /// `last_frame_from_target`; without a turn that was found its rotation is the identity.
     pub flange_from_target: Transform,
@@ -74,7 +79,8 @@ pub struct Placed {
     pub oriented: bool,
     /// Whether the target's point was found, and not taken from the robot's file.
     pub target_found: bool,
-    /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of smooth errors.
+    /// Mean square of what a fresh pose is off by beside all this, mm^2: its scatter, and what placements share of
+    /// smooth errors.
     pub fresh_mm2: f64,
     /// How large readings are off.
     scatter: Scatter,
@@ -90,8 +96,9 @@ pub struct Placed {
 }
 
 impl Placed {
-    /// `rows` have points, `offsets` are zero where `sensor` says what was found of the sensor's errors, `shared` is the covariance of both, and
-    /// `common` how many times larger than of independent errors variances are. `None` where no group has a frame.
+    /// `rows` have points, `offsets` are zero where `sensor` says what was found of the sensor's errors, `shared` is
+    /// the covariance of both, and `common` how many times larger than of independent errors variances are. `None`
+    /// where no group has a frame.
     pub fn new(
         set: &Dataset,
         rows: &Rows,
@@ -163,8 +170,8 @@ impl Placed {
         Uncertain { transform: self.flange_from_target, covariance }
     }
 
-    /// The target's point in the frame of a group's sensor at each of these joints (rad), and its covariance, mm^2: what the next reading there
-    /// is without its own noise and scatter, of a sensor without errors of its own.
+    /// The target's point in the frame of a group's sensor at each of these joints (rad), and its covariance, mm^2:
+    /// what the next reading there is without its own noise and scatter, of a sensor without errors of its own.
     pub fn points(&self, index: usize, joints: &[&[f64]]) -> Vec<(Vector3<f64>, Matrix3<f64>)> {
         let poses: Vec<(&[f64], Option<&Matrix3xX<f64>>)> = joints.iter().map(|&joints| (joints, None)).collect();
         let of_columns = |(point, columns): (Point3<f64>, DMatrix<f64>)| {
@@ -174,8 +181,8 @@ impl Placed {
         self.columns(index, &poses).into_iter().map(of_columns).collect()
     }
 
-    /// The point, and what it moves by with each unknown of the covariance, at each of these poses: joints (rad), and columns of what the
-    /// sensor's readings there have in common.
+    /// The point, and what it moves by with each unknown of the covariance, at each of these poses: joints (rad), and
+    /// columns of what the sensor's readings there have in common.
     fn columns(&self, index: usize, poses: &[(&[f64], Option<&Matrix3xX<f64>>)]) -> Vec<(Point3<f64>, DMatrix<f64>)> {
         let nominal = &self.kinematics.nominal;
         let joints: Vec<&[f64]> = poses.iter().map(|(joints, _)| *joints).collect();
@@ -196,8 +203,8 @@ impl Placed {
         kinematics.places(&self.offsets, true).into_iter().zip(poses).map(of_place).collect()
     }
 
-    /// How far off the target is to be expected at the poses of one of the groups: against where the same sensor reads it at such a pose, beside
-    /// the noise of a reading that its covariance states.
+    /// How far off the target is to be expected at the poses of one of the groups: against where the same sensor reads
+    /// it at such a pose, beside the noise of a reading that its covariance states.
     pub fn expected(&self, set: &Dataset, index: usize) -> Lengths {
         let poses = set.poses.iter().enumerate().filter(|(_, pose)| pose.group == self.groups[index].0);
         let poses = poses.map(|(row, pose)| (pose.joints_rad.as_slice(), set.shared.get(row))).collect::<Vec<_>>();
@@ -221,7 +228,8 @@ fn following(count: usize, follows: &[DMatrix<f64>]) -> DMatrix<f64> {
     follow
 }
 
-/// The covariance of shared offsets and of all placements' own unknowns, which follow them and have errors of their own.
+/// The covariance of shared offsets and of all placements' own unknowns, which follow them and have errors of their
+/// own.
 fn together(shared: &DMatrix<f64>, follow: &DMatrix<f64>, own: &[DMatrix<f64>]) -> DMatrix<f64> {
     let count = shared.ncols();
     let mut covariance = follow * shared * follow.transpose();

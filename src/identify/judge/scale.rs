@@ -1,10 +1,12 @@
-//! A scale of the readings: whether all links come out too long, or too short, by one share, and how large a share would not be seen.
+//! A scale of the readings: whether all links come out too long, or too short, by one share, and how large a share
+//! would not be seen.
 //!
-//! In: the fit of the chain. Out: the share, its standard deviation, and how much more probable the links are with it than without.
-//! Points and distances that are all too long by one share fit a robot that is too large by it, and leave no residual. What tells is the
-//! tolerance of the links alone: their errors have nothing to do with their lengths. How large that tolerance is, the links' errors say
-//! themselves, with what is known of workshops where they are few; the share is then a generalised least squares over what the poses
-//! determine, and the evidence (as for the tolerances: MacKay, "Bayesian interpolation", 1992) weighs it against no share.
+//! In: the fit of the chain. Out: the share, its standard deviation, and how much more probable the links are with it
+//! than without. Points and distances that are all too long by one share fit a robot that is too large by it, and leave
+//! no residual. What tells is the tolerance of the links alone: their errors have nothing to do with their lengths. How
+//! large that tolerance is, the links' errors say themselves, with what is known of workshops where they are few; the
+//! share is then a generalised least squares over what the poses determine, and the evidence (as for the tolerances:
+//! MacKay, "Bayesian interpolation", 1992) weighs it against no share.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -21,8 +23,8 @@ const SMALLEST_MM: f64 = 0.02;
 const TOLERANCES: i32 = 36;
 const STEP: f64 = 1.25;
 
-/// Standard deviation of the target's place for this, mm: it is mounted by hand, and a place that is right by chance is no proof of the
-/// scale.
+/// Standard deviation of the target's place for this, mm: it is mounted by hand, and a place that is right by chance is
+/// no proof of the scale.
 const MOUNTED_MM: f64 = 100.0;
 
 /// What is known of them: robots are built to this, mm, give or take such a factor.
@@ -57,7 +59,8 @@ pub struct CommonScale {
 }
 
 impl CommonScale {
-    /// Of a fit of a robot with these terms; `None` where its links were not fitted, or nothing that was measured has their scale.
+    /// Of a fit of a robot with these terms; `None` where its links were not fitted, or nothing that was measured has
+    /// their scale.
     pub fn new(set: &Dataset, terms: &Terms, formulation: &Formulation) -> Option<CommonScale> {
         if terms.chain != Chain::Mdh || !formulation.scale_seen || !formulation.held {
             return None;
@@ -133,8 +136,8 @@ impl Weighed {
         (longer, links): (&DVector<f64>, &[DVector<f64>]),
         before: f64,
     ) -> Option<Weighed> {
-        // What is measured of the links scatters by the tolerance and the noise: with N = J'J and C the tolerance, its weight is
-        // (C + N^-1)^-1 = (I + N C)^-1 N.
+        // What is measured of the links scatters by the tolerance and the noise: with N = J'J and C the tolerance, its
+        // weight is (C + N^-1)^-1 = (I + N C)^-1 N.
         let (lu, log_determinant) = weighed(normal, covariance);
         let seen = lu.solve(gradient)?;
         let of_longer = lu.solve(&(normal * longer))?;
@@ -156,8 +159,8 @@ impl Weighed {
         self.pull / self.precision
     }
 
-    /// Logarithm of the factor by which a scale of such a standard deviation makes the data more probable; with an infinite one up to a
-    /// factor that all tolerances share.
+    /// Logarithm of the factor by which a scale of such a standard deviation makes the data more probable; with an
+    /// infinite one up to a factor that all tolerances share.
     fn gain(&self, scale: f64) -> f64 {
         match scale.is_finite() {
             true => gain(self.pull, self.precision, scale),
@@ -184,7 +187,8 @@ fn summed_up(weighed: &[Weighed], of: &'static str) -> CommonScale {
         |of: &dyn Fn(&Weighed) -> f64| weighed.iter().map(|w| (log_weight(w) - total).exp() * of(w)).sum::<f64>();
     let share = mean(&|w| w.share());
     let sigma = mean(&|w| 1.0 / w.precision + (w.share() - share).powi(2)).sqrt();
-    // Few links leave their tolerance open, and with it the tails: a normal distribution of this sigma has shorter ones.
+    // Few links leave their tolerance open, and with it the tails: a normal distribution of this sigma has shorter
+    // ones.
     let normal = Normal::standard();
     let larger = |limit: f64| {
         mean(&|w| {

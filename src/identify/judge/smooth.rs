@@ -1,10 +1,11 @@
 //! Whether the points of a placement share a smooth error, and how large and how smooth it is.
 //!
-//! In: rows of points, white and linearised where a rich model fits them. Out: the smooth error that makes them most probable, where it makes
-//! them more probable than independent noise does. For each length the rows become the product of all their columns (parameters,
-//! transform, the error's functions, residual) with themselves; every size of error and noise is then algebra on small matrices.
-//! The transforms are integrated out (restricted likelihood: Patterson and Thompson, Biometrika 58, 1971), the parameters have their prior.
-//! What goes wrong: an error that the robot's parameters can follow, or that is small beside the noise, is not seen.
+//! In: rows of points, white and linearised where a rich model fits them. Out: the smooth error that makes them most
+//! probable, where it makes them more probable than independent noise does. For each length the rows become the product
+//! of all their columns (parameters, transform, the error's functions, residual) with themselves; every size of error
+//! and noise is then algebra on small matrices. The transforms are integrated out (restricted likelihood: Patterson and
+//! Thompson, Biometrika 58, 1971), the parameters have their prior. What goes wrong: an error that the robot's
+//! parameters can follow, or that is small beside the noise, is not seen.
 
 use nalgebra::{Cholesky, DMatrix};
 
@@ -23,8 +24,8 @@ pub struct Detected {
     pub evidence: f64,
 }
 
-/// Logarithm of the evidence that a smooth error must bring. It only makes the result less certain: more would be asked of something that
-/// changes what is said of the robot.
+/// Logarithm of the evidence that a smooth error must bring. It only makes the result less certain: more would be asked
+/// of something that changes what is said of the robot.
 const ENOUGH: f64 = 2.0;
 
 /// A smooth error of less than this is rounding, mm: data without noise have one.
@@ -39,7 +40,8 @@ const SIZES: [f64; 9] = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6, 8.0];
 /// Factors of the noise that are tried beside it.
 const NOISES: [f64; 8] = [0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2];
 
-/// Fewest points of a placement by which to tell, and fewest such placements: in a single one the robot's own errors are as smooth.
+/// Fewest points of a placement by which to tell, and fewest such placements: in a single one the robot's own errors
+/// are as smooth.
 const FEWEST: usize = 8;
 const PLACEMENTS: usize = 2;
 
@@ -50,8 +52,8 @@ struct Products {
     numbers: f64,
 }
 
-/// The smooth error; `None` where nothing tells of one. `offsets` are where the rows are linearised, `sds` the standard deviations of
-/// parameters and extras before the data.
+/// The smooth error; `None` where nothing tells of one. `offsets` are where the rows are linearised, `sds` the standard
+/// deviations of parameters and extras before the data.
 pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Detected> {
     let size_mm = size_mm(rows)?;
     let unit_mm = rows.unit_variance_mm2().sqrt();
@@ -80,7 +82,8 @@ pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Detect
         .filter(|detected| detected.evidence > ENOUGH && detected.error.sd_mm > SMALLEST_MM)
 }
 
-/// Root mean square distance of points from the middle of their placement, mm; `None` where there are too few points or placements.
+/// Root mean square distance of points from the middle of their placement, mm; `None` where there are too few points or
+/// placements.
 fn size_mm(rows: &Rows) -> Option<f64> {
     let (mut square, mut count, mut placements) = (0.0, 0, 0);
     for block in &rows.blocks {
@@ -110,7 +113,8 @@ fn products(rows: &Rows, problem: &Linearised, length_mm: f64) -> Vec<Products> 
     rows.blocks.iter().zip(&problem.placements).filter_map(of_block).collect()
 }
 
-/// Logarithm of the data's probability with an error of so many mm a unit of noise, and noise of so many times that of the rows.
+/// Logarithm of the data's probability with an error of so many mm a unit of noise, and noise of so many times that of
+/// the rows.
 fn evidence(products: &[Products], sds: &[f64], ratio_mm: f64, noise: f64) -> f64 {
     let kept = sds.len() + 1;
     let precision = 1.0 / (noise * noise);

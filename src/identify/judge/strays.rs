@@ -1,9 +1,11 @@
-//! Rows that are so far off a robot that is not fitted that they are no errors of it: a misread point, the joints of another row.
+//! Rows that are so far off a robot that is not fitted that they are no errors of it: a misread point, the joints of
+//! another row.
 //!
-//! In: robots, each with the rows as it takes them, those that place the sensor and those that are judged. Out: the rows that are many times as far off as most, by the robot that is
-//! nearest, and whether the readings of two of them are exchanged. Method: placements by the four fifths of each group's rows that come nearest
-//! (the concentration steps of Rousseeuw and Van Driessen, 1999). Goes wrong: robots that are off by as much as the strays, and strays that are more
-//! than a fifth of the rows: then none is named.
+//! In: robots, each with the rows as it takes them, those that place the sensor and those that are judged. Out: the
+//! rows that are many times as far off as most, by the robot that is nearest, and whether the readings of two of them
+//! are exchanged. Method: placements by the four fifths of each group's rows that come nearest (the concentration steps
+//! of Rousseeuw and Van Driessen, 1999). Goes wrong: robots that are off by as much as the strays, and strays that are
+//! more than a fifth of the rows: then none is named.
 
 use super::errors::{Judge, RowError};
 use crate::identify::data::dataset::Dataset;
@@ -11,7 +13,8 @@ use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::Robot;
 use crate::statistics::median;
 
-/// Errors of a robot vary with the posture by some times their median; a row that is off by more than so many is another thing.
+/// Errors of a robot vary with the posture by some times their median; a row that is off by more than so many is
+/// another thing.
 const FAR: f64 = 12.0;
 
 /// One row in so many may be a stray.

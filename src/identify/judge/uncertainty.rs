@@ -48,13 +48,14 @@ pub struct Expected {
     pub p95_mm: f64,
     /// Expected length of the error at the worst pose, mm.
     pub max_mm: f64,
-    /// Mean of the expected length of the error that the parameters and the placement make, mm: against a truth without noise.
+    /// Mean of the expected length of the error that the parameters and the placement make, mm: against a truth without
+    /// noise.
     pub of_robot_mm: f64,
-    /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, repeatability, and smooth errors that
-    /// the points of a placement share.
+    /// The part of the mean that the robot's own scatter makes, mm: a model that is not quite right, repeatability, and
+    /// smooth errors that the points of a placement share.
     pub scatter_mm: f64,
-    /// Standard deviation that readings state of a coordinate, or of a distance, as the fit took them, mm: it is in none of these. `None` where they
-    /// state none, and the scatter is theirs, too.
+    /// Standard deviation that readings state of a coordinate, or of a distance, as the fit took them, mm: it is in
+    /// none of these. `None` where they state none, and the scatter is theirs, too.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stated_mm: Option<f64>,
     /// Degrees of freedom by which the residuals tell how large they are.
@@ -68,7 +69,8 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// At poses like those of the set, the placements fitted to `fitted`: at a row that was fitted it is that of a fit without it.
+    /// At poses like those of the set, the placements fitted to `fitted`: at a row that was fitted it is that of a fit
+    /// without it.
     pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
         Expected::at(formulation, set, fitted, &(0..set.poses.len()).collect::<Vec<_>>())
     }
@@ -159,10 +161,11 @@ pub fn stated_mm(set: &Dataset) -> Option<f64> {
 /// Share of a row's own reading in what is predicted there, of which on more is not told from all of it.
 const ALL: f64 = 0.99;
 
-/// Times that the variance of the point predicted at each row of the data set is larger without that row's reading; one at rows that were not fitted.
-/// A fit follows the rows that it has, and the fewer they are, the less what is uncertain there says of poses between them. Of white readings with the
-/// variance H predicted by the fit the one without a row is `H (I - H)^-1` (Cook and Weisberg, "Residuals and Influence in Regression", 1982). The
-/// sensor's own errors are taken as found: they are of all rows.
+/// Times that the variance of the point predicted at each row of the data set is larger without that row's reading; one
+/// at rows that were not fitted. A fit follows the rows that it has, and the fewer they are, the less what is uncertain
+/// there says of poses between them. Of white readings with the variance H predicted by the fit the one without a row
+/// is `H (I - H)^-1` (Cook and Weisberg, "Residuals and Influence in Regression", 1982). The sensor's own errors are
+/// taken as found: they are of all rows.
 fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     let mut times = vec![1.0; set.poses.len()];
     if !matches!(formulation.model, Model::Position | Model::Pose) {
@@ -180,7 +183,8 @@ fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     times
 }
 
-/// Of each row of a placement: its row of the data set, where its white residuals stand, and the variance that the fit predicts them to.
+/// Of each row of a placement: its row of the data set, where its white residuals stand, and the variance that the fit
+/// predicts them to.
 type Predicted = Vec<(usize, Range<usize>, DMatrix<f64>)>;
 
 /// The placements of a fit with the sensor's own errors as found, and what it predicts of each row.

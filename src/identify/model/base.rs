@@ -1,9 +1,10 @@
 //! Which parameters the poses can determine: base parameters by rank-revealing QR, and the paper's elimination.
 //!
 //! In: the Jacobian, a column a parameter in mm and mrad (not normalised: a column's length is what the parameter can
-//! do to the data). Zero columns go first. Of the rest, Householder QR with column pivoting keeps the columns that stand
-//! for themselves; each other one is a combination of those, and they are named together, as in `d_2 + d_3 + d_4`.
-//! Source of the observability indices: Sun and Hollerbach, "Observability index selection for robot calibration" (2008).
+//! do to the data). Zero columns go first. Of the rest, Householder QR with column pivoting keeps the columns that
+//! stand for themselves; each other one is a combination of those, and they are named together, as in `d_2 + d_3 +
+//! d_4`. Source of the observability indices: Sun and Hollerbach, "Observability index selection for robot calibration"
+//! (2008).
 
 use nalgebra::{DMatrix, DVector};
 
@@ -15,7 +16,8 @@ const NAMED: f64 = 1e-3;
 /// Those below this share no correction that matters.
 pub const NEGLIGIBLE: f64 = 0.02;
 
-/// Columns within this of the longest count as equally long, and the first of them is taken: names don't depend on rounding.
+/// Columns within this of the longest count as equally long, and the first of them is taken: names don't depend on
+/// rounding.
 const TIE: f64 = 1e-9;
 
 /// The parameters that a Jacobian determines.
@@ -91,9 +93,9 @@ impl Base {
         Base { free, zero, dependent, coefficients, singular_values }
     }
 
-    /// The paper's way (section 3.1): zero columns go, then, while two columns are as good as parallel or the rest lacks rank,
-    /// the one with the largest correlation with another; of a pair the later goes. It cannot see a dependence of three columns before
-    /// the last two of it correlate, so it may drop more than it must.
+    /// The paper's way (section 3.1): zero columns go, then, while two columns are as good as parallel or the rest
+    /// lacks rank, the one with the largest correlation with another; of a pair the later goes. It cannot see a
+    /// dependence of three columns before the last two of it correlate, so it may drop more than it must.
     pub fn by_correlation(jacobian: &DMatrix<f64>, tolerance: f64) -> Base {
         let reference = Base::new(jacobian, tolerance);
         let rank = reference.free.len();
@@ -132,8 +134,8 @@ impl Base {
         Some(self.singular_values.first()? / self.singular_values.last()?)
     }
 
-    /// A base parameter by its place among them, and the parameters that act like it by at least such a share: what is determined is the
-    /// sum of their corrections, each times its coefficient.
+    /// A base parameter by its place among them, and the parameters that act like it by at least such a share: what is
+    /// determined is the sum of their corrections, each times its coefficient.
     pub fn sum(&self, row: usize, least: f64) -> Vec<(usize, f64)> {
         let others =
             self.dependent.iter().enumerate().map(|(column, &other)| (other, self.coefficients[(row, column)]));

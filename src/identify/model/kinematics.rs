@@ -1,8 +1,8 @@
 //! The robot at the poses of a data set, as a function of the offsets of chosen parameters.
 //!
 //! In: offsets in mm and mrad. Out: the target's point and the flange's rotation at every pose, base frame, and their
-//! derivatives. Features of the corrections (levers, waves) are constants of the pose; the chain that levers are taken on is given,
-//! so that a fit can end on its own.
+//! derivatives. Features of the corrections (levers, waves) are constants of the pose; the chain that levers are taken
+//! on is given, so that a fit can end on its own.
 
 use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use rayon::prelude::*;

@@ -117,8 +117,9 @@ impl Terms {
         name
     }
 
-    /// What can be tried from here: every richer chain, and with the whole chain every term that is not taken yet. Rungs that failed
-    /// from a poorer model are tried again from a richer one; below the whole chain every term is also tried together with it.
+    /// What can be tried from here: every richer chain, and with the whole chain every term that is not taken yet.
+    /// Rungs that failed from a poorer model are tried again from a richer one; below the whole chain every term is
+    /// also tried together with it.
     pub fn successors(&self, robot: &Robot) -> Vec<Terms> {
         let chains = [Chain::Tool, Chain::Offsets, Chain::Mdh];
         let mut next: Vec<Terms> =

@@ -1,9 +1,10 @@
 //! Manufacturing tolerance as a prior, its size taken from the evidence of the data.
 //!
-//! In: the whitened Jacobian and residuals of a linearised fit. Out: rows that pull the base parameters towards nominal.
-//! Each parameter's offset is Gaussian with the standard deviation of its kind; a base parameter that stands for others
-//! has the variance of their combination, and its correction is spread over them as their tolerances say. The factors maximise the probability of the data (type II maximum likelihood:
-//! MacKay, "Bayesian interpolation", 1992) over a grid, one kind after the other.
+//! In: the whitened Jacobian and residuals of a linearised fit. Out: rows that pull the base parameters towards
+//! nominal. Each parameter's offset is Gaussian with the standard deviation of its kind; a base parameter that stands
+//! for others has the variance of their combination, and its correction is spread over them as their tolerances say.
+//! The factors maximise the probability of the data (type II maximum likelihood: MacKay, "Bayesian interpolation",
+//! 1992) over a grid, one kind after the other.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, LU};
 
@@ -15,7 +16,8 @@ use crate::robot::Parameter;
 /// Standard deviations that are tried for every kind, mm, mrad or thousandths.
 const GRID: [f64; 13] = [1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0];
 
-/// Largest of them by kind (lengths, angles, target, gravity, harmonics, couplings, zero, warps): what no workshop gets wrong.
+/// Largest of them by kind (lengths, angles, target, gravity, harmonics, couplings, zero, warps): what no workshop gets
+/// wrong.
 const LARGEST: [f64; KINDS] = [30.0, 30.0, 1000.0, 30.0, 10.0, 30.0, 100.0, 30.0];
 
 /// Logarithm of the evidence that a standard deviation may lack: one in three.
@@ -169,8 +171,8 @@ impl Tolerance {
         spread
     }
 
-    /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with the evidence.
-    /// `normal` and `gradient` as in [`Likelihood`].
+    /// The tolerance of greatest evidence for all parameters as they are, whether or not the data tell them apart; with
+    /// the evidence. `normal` and `gradient` as in [`Likelihood`].
     pub fn from_evidence_of_all(
         parameters: &[Parameter],
         extras: &[Extra],
@@ -214,8 +216,8 @@ impl Likelihood<'_> {
         best_of_grid(&self.seen(), self.extras, &|t| self.evidence(t)).0
     }
 
-    /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say little of how well
-    /// a robot was made, and what they leave open is as uncertain as it may be.
+    /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say
+    /// little of how well a robot was made, and what they leave open is as uncertain as it may be.
     pub fn at_most(&self, tolerance: &Tolerance) -> Tolerance {
         let least = self.evidence(tolerance) - DOUBT;
         let present = presence(&self.seen(), self.extras);
@@ -259,14 +261,14 @@ fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tole
     if !present[ZERO] {
         return from(start);
     }
-    // A zero and the robot's size can look the same: what the one takes the other need not, and one kind after the other does not get from
-    // here to there.
+    // A zero and the robot's size can look the same: what the one takes the other need not, and one kind after the
+    // other does not get from here to there.
     let rest = |best: (Tolerance, f64), next: (Tolerance, f64)| if next.1 > best.1 { next } else { best };
     ZERO_STARTS.iter().map(|&zero_mm| from(Tolerance { zero_mm, lengths_mm: 0.3, ..start })).fold(from(start), rest)
 }
 
-/// Logarithm of the data's probability up to what the prior does not touch, for unknowns that are independent before the data: of these
-/// standard deviations. `normal` and `gradient` as in [`Likelihood`].
+/// Logarithm of the data's probability up to what the prior does not touch, for unknowns that are independent before
+/// the data: of these standard deviations. `normal` and `gradient` as in [`Likelihood`].
 pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f64>) -> f64 {
     let n = sds.len();
     let inner = DMatrix::from_fn(n, n, |r, c| sds[r] * sds[c] * normal[(r, c)] + if r == c { 1.0 } else { 0.0 });
@@ -275,7 +277,8 @@ pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f6
         let log_determinant = 2.0 * inner.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
         return 0.5 * (pulled.dot(&inner.solve(&pulled)) - log_determinant);
     }
-    // Data without noise weigh so much that the one of the prior is lost in rounding where they tell nothing: there it is put back.
+    // Data without noise weigh so much that the one of the prior is lost in rounding where they tell nothing: there it
+    // is put back.
     let eigen = inner.symmetric_eigen();
     let along = eigen.eigenvectors.tr_mul(&pulled);
     let of_each =
@@ -283,7 +286,8 @@ pub fn evidence_of_all(sds: &[f64], normal: &DMatrix<f64>, gradient: &DVector<f6
     0.5 * of_each.sum::<f64>()
 }
 
-/// I + N C of a product N of the white Jacobian with itself and a covariance C before the data, and the logarithm of its determinant.
+/// I + N C of a product N of the white Jacobian with itself and a covariance C before the data, and the logarithm of
+/// its determinant.
 pub fn weighed(normal: &DMatrix<f64>, covariance: &DMatrix<f64>) -> (LU<f64, Dyn, Dyn>, f64) {
     let mut inner = normal * covariance;
     for i in 0..inner.nrows() {

@@ -1,6 +1,7 @@
 //! Whether to use the robot that was found, and the warnings in the order of their weight.
 //!
-//! In: the record as it is, and what was found. What goes wrong: readings that scatter by millimetres, and hide errors that no robot has.
+//! In: the record as it is, and what was found. What goes wrong: readings that scatter by millimetres, and hide errors
+//! that no robot has.
 
 use nalgebra::Point3;
 
@@ -108,8 +109,8 @@ impl Record {
         Some(Finding::new(said, "look at these rows, or measure others").about(rows))
     }
 
-    /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is left once it is
-    /// solved counts.
+    /// A nominal robot that is farther off than built ones are. The tool is a free number, and usually unknown: what is
+    /// left once it is solved counts.
     fn implausible(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
         let before = self.with_tool_mm(set, nominal).or(self.before.judged().distance.mean_abs_mm);
         let before = before.filter(|&off| off > IMPLAUSIBLE_MM)?;
@@ -121,8 +122,8 @@ impl Record {
 
     /// Points that a chain of links predicts as no instrument measures them.
     fn computed(&self, set: &Dataset) -> Option<String> {
-        /// Two digits of the last place that is printed, where that is a hundredth of a mm: no arm keeps to a chain of links so well. Nor does an
-        /// instrument read the points of one to two micrometres, whatever is printed.
+        /// Two digits of the last place that is printed, where that is a hundredth of a mm: no arm keeps to a chain of
+        /// links so well. Nor does an instrument read the points of one to two micrometres, whatever is printed.
         const PRINTED_MM: f64 = 0.01;
         const READ_MM: f64 = 0.001;
         let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
@@ -131,7 +132,8 @@ impl Record {
             2.0 * if points.iter().flat_map(|point| point.iter()).all(is_printed) { PRINTED_MM } else { READ_MM };
         let largest = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.max_abs_mm);
         let held_out_mm = largest(self.chosen_method().map_or(&self.before, |method| &method.quality).judged())?;
-        // What is left where the numbers are twice the unknowns is no better for being fitted, and free of what rounding does to rows left out.
+        // What is left where the numbers are twice the unknowns is no better for being fitted, and free of what
+        // rounding does to rows left out.
         let redundant = |m: &&MethodRecord| 3 * points.len() >= 2 * (m.parameters.len() + 6 * set.groups.len());
         let left_mm = self.chosen_method().filter(redundant).and_then(|method| largest(&method.quality.fit));
         let largest_mm = held_out_mm.min(left_mm.unwrap_or(f64::INFINITY));
@@ -161,8 +163,8 @@ impl Record {
         self.tool_mm.map(|(_, left)| left).or_else(|| nominal.left_mm(&joints, &points))
     }
 
-    /// An expected error that the rows themselves contradict: those left out miss by several times as much, or miss by more than the nominal
-    /// robot does with a tool of its own, or the nominal robot is off by less.
+    /// An expected error that the rows themselves contradict: those left out miss by several times as much, or miss by
+    /// more than the nominal robot does with a tool of its own, or the nominal robot is off by less.
     fn promise(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
         /// Beyond what leaving a row out costs where unknowns are half of the numbers.
         const SEVERAL: f64 = 3.0;
@@ -175,7 +177,8 @@ impl Record {
         let held_out_mm = mean(chosen.quality.judged());
         let few = "there are too few rows for so many unknowns; measure more, that bend every joint";
         if let Some(off) = held_out_mm.filter(|off| *off > SEVERAL * expected_mm) {
-            // Where rows are no fewer than half as many more as are needed, what is expected holds what they leave open.
+            // Where rows are no fewer than half as many more as are needed, what is expected holds what they leave
+            // open.
             let unknowns = chosen.parameters.len() + 6 * set.groups.len();
             let why = if self.folded || 3 * set.fit_rows().len() < 2 * unknowns { few } else { ANOTHER_STATE };
             return Some(format!(

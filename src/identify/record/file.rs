@@ -66,11 +66,13 @@ pub struct Record {
     pub covariance: Option<Covariance>,
     /// The same with what the poses tell next to nothing of as uncertain as before them: for poses elsewhere.
     pub whole_covariance: Option<Covariance>,
-    /// Times that the variance of residuals along what may change on a robot is larger than alike in all directions, by its word of `verify --against`.
+    /// Times that the variance of residuals along what may change on a robot is larger than alike in all directions, by
+    /// its word of `verify --against`.
     pub variance_along: BTreeMap<String, f64>,
     /// The position error to expect of the chosen robot; `None` where nominal was kept.
     pub expected: Option<Expected>,
-    /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links were not fitted.
+    /// A scale of the readings, as far as the links' tolerance tells it from the robot's size; `None` where the links
+    /// were not fitted.
     pub scale: Option<CommonScale>,
     /// The targets of each pose, where there are several.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,10 +84,12 @@ pub struct Record {
     pub certainty: Vec<Certainty>,
     /// Whether `verify` has all rows, each in fits that it was left out of, because the file has none to verify.
     pub folded: bool,
-    /// The tool that the nominal chain asks for and the middle error that is left with it, mm, where that is far less than with the tool of the file.
+    /// The tool that the nominal chain asks for and the middle error that is left with it, mm, where that is far less
+    /// than with the tool of the file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool_mm: Option<([f64; 3], f64)>,
-    /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard deviations).
+    /// Unknowns of the sensor that were found beside the robot: name and value (mm, thousandths, mrad, standard
+    /// deviations).
     pub sensor: Vec<(String, f64)>,
     /// A smooth error that the points of each placement share.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -17,7 +17,8 @@ use crate::identify::record::{left_out, misfits, plausible, rounded};
 use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
 
-/// Times the scatter that no built robot has after a fit, from which on it speaks against the result whatever seemed to explain it before.
+/// Times the scatter that no built robot has after a fit, from which on it speaks against the result whatever seemed to
+/// explain it before.
 const FAR_BEYOND: f64 = 3.0;
 
 /// How many times smaller than what lies between the points their scatter must be.
@@ -37,8 +38,9 @@ pub struct Findings {
 }
 
 impl Findings {
-    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file, speak against it. Where the rows
-    /// are not of one robot, one tool or one unit, that is the cause of whatever is odd about a robot fitted to all of them.
+    /// Those of the data, and those of the fit: what nothing explains, and a robot that is not the one of the file,
+    /// speak against it. Where the rows are not of one robot, one tool or one unit, that is the cause of whatever is
+    /// odd about a robot fitted to all of them.
     pub fn new(
         examined: Vec<Finding>,
         (cause, unexplained): (Vec<Finding>, Option<Finding>),
@@ -63,8 +65,8 @@ impl Findings {
         let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let many = many_left_out(set, found);
-        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of rows that nothing explains it
-        // says nothing.
+        // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of
+        // rows that nothing explains it says nothing.
         let (scale, other) = (scale(set, found).filter(|_| is_reached), plausible::of_another_robot(found));
         // A scale that explains all links is why they are far off, and no other robot.
         let (of_links, scale) = if other.is_some() { (scale.or(other), None) } else { (None, scale) };
@@ -101,8 +103,8 @@ impl Findings {
     }
 }
 
-/// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole search reaches it, or leaves
-/// nothing but the readings' scatter.
+/// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole
+/// search reaches it, or leaves nothing but the readings' scatter.
 pub fn is_explained(set: &Dataset, found: &Identification) -> bool {
     is_plausible(found) || of_noise(set, found).is_some()
 }
@@ -140,8 +142,8 @@ fn few_left_out(found: &Identification) -> bool {
     found.formulation().is_some() && found.outliers.len() * 10 <= found.fitted.len()
 }
 
-/// Points that scatter by more than a robot could, where nothing of that follows the joints and the links are those of the file's robot. Rows that
-/// were exchanged scatter as well, by as much as the points lie apart.
+/// Points that scatter by more than a robot could, where nothing of that follows the joints and the links are those of
+/// the file's robot. Rows that were exchanged scatter as well, by as much as the points lie apart.
 fn of_noise(set: &Dataset, found: &Identification) -> Option<Finding> {
     let scatter_mm = found.scatter.point_mm;
     let may_be = scatter_mm >= conventions::IMPLAUSIBLE_MM && few_left_out(found);
@@ -297,7 +299,8 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     list
 }
 
-/// Logarithm of the evidence from which on a smooth error is told of: of clean sets of four placements one in seventy has as much.
+/// Logarithm of the evidence from which on a smooth error is told of: of clean sets of four placements one in seventy
+/// has as much.
 const SMOOTH: f64 = 2.5;
 
 /// To one digit.

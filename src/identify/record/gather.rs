@@ -88,8 +88,8 @@ impl Record {
     }
 }
 
-/// The tool that a chain asks for, mm, and what it leaves with it (mm, median), where it makes it far nearer to the points of the placement with most
-/// rows, or brings touches far nearer to each other.
+/// The tool that a chain asks for, mm, and what it leaves with it (mm, median), where it makes it far nearer to the
+/// points of the placement with most rows, or brings touches far nearer to each other.
 pub fn asked_tool(set: &Dataset, nominal: &Robot) -> Option<([f64; 3], f64)> {
     /// Times that the chain must come nearer by a tool of its own.
     const FAR_NEARER: f64 = 3.0;

@@ -1,12 +1,13 @@
 //! Rows that were left out because of what a joint did in them: they are the ones that tell of it, and no gross errors.
 //!
-//! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the joint, and the finding. Method:
-//! three looks. Rows in which a joint is not where it is in most of them, and rows that fill a part of its range: how likely it is that so many of
-//! them are among those left out by chance (the hypergeometric distribution). Errors along which a joint moves the target: gross errors go
-//! anywhere, so that the cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's method). A joint
-//! that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque about it; else both are named.
-//! Each times the joints and ways that were looked at. Goes wrong: a joint that moves in every row; few rows whose errors share a direction in the
-//! sensor's frame, which is then no joint's.
+//! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the
+//! joint, and the finding. Method: three looks. Rows in which a joint is not where it is in most of them, and rows that
+//! fill a part of its range: how likely it is that so many of them are among those left out by chance (the
+//! hypergeometric distribution). Errors along which a joint moves the target: gross errors go anywhere, so that the
+//! cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's
+//! method). A joint that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque
+//! about it; else both are named. Each times the joints and ways that were looked at. Goes wrong: a joint that moves in
+//! every row; few rows whose errors share a direction in the sensor's frame, which is then no joint's.
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -28,8 +29,8 @@ const NEARLY_ALL: f64 = 0.8;
 /// Chance with which rows left out are those of one joint by accident.
 const CHANCE: f64 = 1e-3;
 
-/// Share of all rows from which on those left out are more than a few that the sensor saw badly, and than what errors below which nineteen of twenty
-/// stay may leave out.
+/// Share of all rows from which on those left out are more than a few that the sensor saw badly, and than what errors
+/// below which nineteen of twenty stay may leave out.
 const MANY: f64 = 0.05;
 
 /// Share of the errors' squares along a joint's motion that explains them; of errors that go anywhere it is a third.
@@ -38,8 +39,8 @@ const EXPLAINED: f64 = 0.8;
 /// By how much a joint is turned to see where it moves the target, rad (of a sliding joint mm).
 const TURN: f64 = 1e-4;
 
-/// The joint whose rows were left out, if they are one joint's. `errors` are the robot's in those rows, of the set with their joints as they are or
-/// moved.
+/// The joint whose rows were left out, if they are one joint's. `errors` are the robot's in those rows, of the set with
+/// their joints as they are or moved.
 pub fn of_a_joint(
     set: &Dataset,
     robot: &Robot,
@@ -79,7 +80,8 @@ impl Rows<'_> {
         if self.set.is_sliding(joint) { (q, "mm") } else { (q.to_degrees(), "deg") }
     }
 
-    /// Whether a joint was read at one and the same place in nearly all of these rows: then its reading stood still, and nothing is said of the robot.
+    /// Whether a joint was read at one and the same place in nearly all of these rows: then its reading stood still,
+    /// and nothing is said of the robot.
     fn is_stuck(&self, joint: usize, rows: &[usize]) -> bool {
         let of = |row: &usize| self.set.poses[*row].joints_rad[joint];
         let all = self.readings(joint);
@@ -301,7 +303,8 @@ mod tests {
         (of_a_joint(&set, found.robot(), &found.fitted, &found.outliers, &errors), found.outliers.len())
     }
 
-    /// A weight turns a joint by as much as its torque about it; an arm that does not move far from its load's side tells no two apart.
+    /// A weight turns a joint by as much as its torque about it; an arm that does not move far from its load's side
+    /// tells no two apart.
     #[test]
     fn a_load_in_some_rows_is_named_and_not_a_joint_alone() {
         let robot = Robot::paper();

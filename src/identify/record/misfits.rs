@@ -1,6 +1,7 @@
 //! Rows that fit far worse than the rest, in words.
 //!
-//! In: the rows that were left out of the fit, those that are doubtful, and rows to verify that are as far off. Out: findings.
+//! In: the rows that were left out of the fit, those that are doubtful, and rows to verify that are as far off. Out:
+//! findings.
 
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
@@ -26,7 +27,8 @@ pub(super) fn of_rows(set: &Dataset, found: &Identification) -> Vec<Finding> {
     out.into_iter().chain(doubtful).collect()
 }
 
-/// The rows that were left out. Rows that were misread stand anywhere in a table; an unbroken block of them has one cause.
+/// The rows that were left out. Rows that were misread stand anywhere in a table; an unbroken block of them has one
+/// cause.
 pub(super) fn left_out(set: &Dataset, found: &Identification) -> Finding {
     let (out, name) = (&found.outliers, |row: usize| &set.poses[row].name);
     let share = 100.0 * out.len() as f64 / (found.fitted.len() + out.len()).max(1) as f64;

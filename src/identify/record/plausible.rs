@@ -27,8 +27,8 @@ pub fn is_explained_by(share: f64, found: &Identification) -> bool {
     far(found, &link_limit, FAR_SIGMAS, share).is_none()
 }
 
-/// Links that are farther from the file's than makers build them, though no other robot's: many times what the other lengths are off by, or more
-/// than any maker's.
+/// Links that are farther from the file's than makers build them, though no other robot's: many times what the other
+/// lengths are off by, or more than any maker's.
 pub fn of_links(found: &Identification) -> Option<Finding> {
     let each = sums(found, &|parameter| is_length(parameter).then_some(1.0), 0.0);
     let usual_mm = median(each.iter().map(|sum| sum.amount.abs() / sum.limit))?;
@@ -67,11 +67,13 @@ pub fn of_terms(found: &Identification) -> Option<Finding> {
 /// How many standard deviations a correction must have to be far from nominal.
 const FAR_SIGMAS: f64 = 5.0;
 
-/// Times the median of what the lengths are off by beyond which one is not as the others: of a normal distribution five standard deviations.
+/// Times the median of what the lengths are off by beyond which one is not as the others: of a normal distribution five
+/// standard deviations.
 const MANY: f64 = 7.4;
 
-/// What the coarsest common tolerance of workshops allows of lengths of one to two metres (ISO 2768-c), and what none does, mm; of real robots the
-/// largest length that is known well is 0.7 mm off. A twist of real ones is up to 12 mrad off.
+/// What the coarsest common tolerance of workshops allows of lengths of one to two metres (ISO 2768-c), and what none
+/// does, mm; of real robots the largest length that is known well is 0.7 mm off. A twist of real ones is up to 12 mrad
+/// off.
 const COARSE_MM: f64 = 3.0;
 const NOBODYS_MM: f64 = 5.0;
 const COARSE_MRAD: f64 = 30.0;
@@ -85,8 +87,8 @@ fn link_limit(parameter: Parameter) -> Option<f64> {
     }
 }
 
-/// The links of two robots of the same joints that are farther apart than those of one robot are built, and joints that are counted the other way
-/// round, for a sentence.
+/// The links of two robots of the same joints that are farther apart than those of one robot are built, and joints that
+/// are counted the other way round, for a sentence.
 pub fn links_apart(nominal: &Robot, other: &Robot) -> Option<String> {
     const WHOLE_TURN: f64 = 1000.0 * std::f64::consts::TAU;
     let apart = |parameter: Parameter| {
@@ -104,9 +106,9 @@ pub fn links_apart(nominal: &Robot, other: &Robot) -> Option<String> {
     (!list.is_empty()).then(|| list.join(", "))
 }
 
-/// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or thousandths. Those of the
-/// real robots of the README's table are less than a third of this. Gears have whole ratios: what a joint turns too far by is a bent or eccentric
-/// one's, and in no range as much as half a per cent.
+/// The size beyond which a term is no gear's, bearing's or encoder's any more: mrad, mrad a metre of lever, or
+/// thousandths. Those of the real robots of the README's table are less than a third of this. Gears have whole ratios:
+/// what a joint turns too far by is a bent or eccentric one's, and in no range as much as half a per cent.
 fn term_limit(parameter: Parameter) -> Option<f64> {
     match parameter {
         Parameter::Harmonic(..) | Parameter::Wobble(..) => Some(10.0),
@@ -116,8 +118,8 @@ fn term_limit(parameter: Parameter) -> Option<f64> {
     }
 }
 
-/// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence. Of lengths it is the correction
-/// of the file's longer by this share.
+/// The determined parameters whose correction is beyond its limit, and is so many standard deviations, for a sentence.
+/// Of lengths it is the correction of the file's longer by this share.
 fn far(found: &Identification, limit: &dyn Fn(Parameter) -> Option<f64>, sigmas: f64, share: f64) -> Option<String> {
     let is_far = |sum: &Sum| sum.amount.abs() > sum.limit && sum.amount.abs() > sigmas * sum.sigma;
     let list: Vec<String> = sums(found, limit, share).into_iter().filter(is_far).map(|sum| sum.said).collect();

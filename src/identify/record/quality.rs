@@ -61,7 +61,8 @@ pub fn quality(
     found: &Identification,
     settings: &Settings,
 ) -> (Quality, Vec<RowError>) {
-    // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors; where targets stand is none.
+    // Points and distances as they were read, as `verify` takes them, which knows nothing of the sensor's errors; where
+    // targets stand is none.
     let of_targets = |extra: &Extra| matches!(extra, Extra::Target(_)) || set.are_on_flange();
     let extras: Vec<(Extra, f64)> = found.extras.iter().copied().filter(|(extra, _)| of_targets(extra)).collect();
     let judge = Judge { extras: &extras, ..Judge::plain(set, &found.fitted, settings.wire_offset) };

@@ -1,10 +1,11 @@
 //! Numbers that were rounded: what the printed digits alone scatter points by.
 //!
-//! In: joints and points as they were printed, and what the fit leaves. Out: joint angles so coarse that they account for what is left; and points
-//! that agree with the chain of links as closely as the digits go, so that nothing is left for an instrument or for how well an arm comes back.
-//! Method: a step of rounding, one for each power of ten where the same number of digits was written of all, has the variance of a uniform error,
-//! that of each joint through its lever; the fit's chi-squared against it. Goes wrong: a display that cuts digits off scatters no more, but
-//! shifts; averages of several readings stand on no step.
+//! In: joints and points as they were printed, and what the fit leaves. Out: joint angles so coarse that they account
+//! for what is left; and points that agree with the chain of links as closely as the digits go, so that nothing is left
+//! for an instrument or for how well an arm comes back. Method: a step of rounding, one for each power of ten where the
+//! same number of digits was written of all, has the variance of a uniform error, that of each joint through its lever;
+//! the fit's chi-squared against it. Goes wrong: a display that cuts digits off scatters no more, but shifts; averages
+//! of several readings stand on no step.
 
 use std::collections::BTreeMap;
 
@@ -28,14 +29,16 @@ const FEWEST: usize = 8;
 /// Readings within this of a multiple of a step are one, in steps.
 const ON_STEP: f64 = 1e-5;
 
-/// Share of the scatter that rounding must account for, and times it that it may be: angles that were commanded as whole numbers scatter by far less.
+/// Share of the scatter that rounding must account for, and times it that it may be: angles that were commanded as
+/// whole numbers scatter by far less.
 const EXPLAINS: f64 = 0.5;
 const MOST: f64 = 1.25;
 
 /// A turn by which the way of the point is seen, rad.
 const SMALL_RAD: f64 = 1e-6;
 
-/// Chance that a fit which leaves rounding alone seems to leave more, or less; and that what is beyond rounding is more than is allowed for.
+/// Chance that a fit which leaves rounding alone seems to leave more, or less; and that what is beyond rounding is more
+/// than is allowed for.
 const CHANCE: f64 = 1e-3;
 const BEYOND: f64 = 0.05;
 
@@ -55,8 +58,8 @@ pub fn of_joints(set: &Dataset, found: &Identification) -> Option<Finding> {
     })
 }
 
-/// Points that agree with the robot as closely as the digits of joints and points go. Joints may be rounded, or be commanded to whole steps. An
-/// instrument that states covariances has measured.
+/// Points that agree with the robot as closely as the digits of joints and points go. Joints may be rounded, or be
+/// commanded to whole steps. An instrument that states covariances has measured.
 pub fn as_closely_as_digits(set: &Dataset, found: &Identification) -> Option<String> {
     let is_stated = set.poses.iter().any(|pose| pose.reading.variance_mm2().is_some());
     if set.kind != Kind::Positions || is_stated {
@@ -96,7 +99,8 @@ pub fn as_closely_as_digits(set: &Dataset, found: &Identification) -> Option<Str
     })
 }
 
-/// The steps that numbers stand on: one, or one for each power of ten where the same number of digits was written of all.
+/// The steps that numbers stand on: one, or one for each power of ten where the same number of digits was written of
+/// all.
 #[derive(Debug, PartialEq)]
 struct Steps {
     /// By the power of ten of numbers, in `unit`.
@@ -137,8 +141,8 @@ impl Steps {
         (self.finest() == self.coarsest()).then(|| self.finest() * self.factor)
     }
 
-    /// The variance of a number that is rounded so, in degrees or millimetres: that of a uniform error. Sizes of which there are few are
-    /// written as finely as any.
+    /// The variance of a number that is rounded so, in degrees or millimetres: that of a uniform error. Sizes of which
+    /// there are few are written as finely as any.
     fn variance(&self, number: f64) -> f64 {
         let step = self.of_powers.get(&power(number / self.factor)).copied().unwrap_or(self.finest());
         (step * self.factor).powi(2) / 12.0

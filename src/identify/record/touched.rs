@@ -1,8 +1,9 @@
 //! The target's place on the flange by touches, with the nominal chain as it is.
 //!
-//! In: touches of points that stand still, and the nominal robot. Out: the place at which the chain predicts the touches of each point nearest to
-//! each other, and how near. That is linear in the place; rows that are far off lose influence by reweighting (least sum of distances).
-//! What goes wrong: one orientation of the flange within each point, which says nothing of the place; then there is no answer.
+//! In: touches of points that stand still, and the nominal robot. Out: the place at which the chain predicts the
+//! touches of each point nearest to each other, and how near. That is linear in the place; rows that are far off lose
+//! influence by reweighting (least sum of distances). What goes wrong: one orientation of the flange within each point,
+//! which says nothing of the place; then there is no answer.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -14,14 +15,16 @@ use crate::statistics::median;
 /// Rounds of reweighting.
 const ROUNDS: usize = 20;
 
-/// Eigenvalue of the normal matrix over the number of rows below which a direction of the place is not determined: turns of a mrad.
+/// Eigenvalue of the normal matrix over the number of rows below which a direction of the place is not determined:
+/// turns of a mrad.
 const LEAST_TURN: f64 = 1e-6;
 
 /// Where the target stands, and what is left.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Touched {
     pub tool_mm: Vector3<f64>,
-    /// Middle distance of a touch from the middle of its point's touches, mm, with the tool of the file and with this one.
+    /// Middle distance of a touch from the middle of its point's touches, mm, with the tool of the file and with this
+    /// one.
     pub before_mm: f64,
     pub left_mm: f64,
 }

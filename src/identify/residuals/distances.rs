@@ -19,7 +19,8 @@ pub struct Distances {
 pub enum Origin {
     /// The centre pose, by its index among the places.
     Center(usize),
-    /// A fixed point that is unknown: where the search for it starts, base frame, mm, and whether the wire's zero is unknown too.
+    /// A fixed point that is unknown: where the search for it starts, base frame, mm, and whether the wire's zero is
+    /// unknown too.
     Anchor(Vector3<f64>, bool),
 }
 
@@ -78,7 +79,8 @@ impl Distances {
         jacobian
     }
 
-    /// White derivatives of the residuals with respect to the point, where it is another one than was measured: three columns.
+    /// White derivatives of the residuals with respect to the point, where it is another one than was measured: three
+    /// columns.
     pub fn of_origin(&self, places: &[Place], scatter: &Scatter) -> DMatrix<f64> {
         let from_mm = self.start(places);
         let mut columns = DMatrix::zeros(self.lengths.len(), 3);

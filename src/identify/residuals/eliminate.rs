@@ -1,9 +1,9 @@
 //! Residuals of one placement of the sensor, with the placement's own unknowns solved for inside.
 //!
 //! In: the target's places in the base frame. Out: white residuals and their derivatives, from which the unknowns of
-//! the placement (a rigid transform, the wire's anchor and zero, touched points) are eliminated: variable projection (Golub and
-//! Pereyra, 1973) with Kaufman's derivative. A model without such unknowns is the special case.
-//! What goes wrong: poses on one line leave the transform's turn about it free; the pseudo-inverse leaves it where it is.
+//! the placement (a rigid transform, the wire's anchor and zero, touched points) are eliminated: variable projection
+//! (Golub and Pereyra, 1973) with Kaufman's derivative. A model without such unknowns is the special case. What goes
+//! wrong: poses on one line leave the transform's turn about it free; the pseudo-inverse leaves it where it is.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -26,7 +26,8 @@ const INNER_GAIN: f64 = 1e-14;
 /// What one block measures.
 #[derive(Debug, Clone)]
 pub enum Block {
-    /// Distances to the group's centre: eq. (7) to (10), the centre computed anew with the same parameters; or to a fixed point that is unknown.
+    /// Distances to the group's centre: eq. (7) to (10), the centre computed anew with the same parameters; or to a
+    /// fixed point that is unknown.
     Distances(Distances),
     /// Touches of fixed points that are unknown, some of them at known distances.
     Touch(Touch),
@@ -170,8 +171,8 @@ impl Block {
         (at, residuals, design)
     }
 
-    /// White residuals with the placement's unknowns at their best, and (where the places have columns and `derivatives`) the Jacobian with these
-    /// eliminated.
+    /// White residuals with the placement's unknowns at their best, and (where the places have columns and
+    /// `derivatives`) the Jacobian with these eliminated.
     pub fn evaluate(&self, state: &State, derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         if !derivatives {
             let residuals = match (self, self.best(state)) {
@@ -191,7 +192,8 @@ impl Block {
         Linear { residuals, jacobian: self.outer(state, &unknowns), design }
     }
 
-    /// Residuals before whitening, for the estimate of the scatter and for lists of what fits badly; by pose, with the row's weight.
+    /// Residuals before whitening, for the estimate of the scatter and for lists of what fits badly; by pose, with the
+    /// row's weight.
     pub fn raw(&self, state: &State) -> Vec<(usize, f64, Raw)> {
         match (self, &self.best(state)) {
             (Block::Distances(distances), Unknowns::Anchor(point, zero)) => distances.raw(state, point, *zero),

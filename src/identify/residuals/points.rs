@@ -31,8 +31,9 @@ impl Points {
         if self.oriented { 6 } else { 3 }
     }
 
-    /// Where the search for the transform starts: at the best for weights that are alike in all directions and for orientations whose errors are small
-    /// angles. Of points on a line the turn about it has a second optimum, and small steps from elsewhere may end in either.
+    /// Where the search for the transform starts: at the best for weights that are alike in all directions and for
+    /// orientations whose errors are small angles. Of points on a line the turn about it has a second optimum, and
+    /// small steps from elsewhere may end in either.
     pub(super) fn start(&self, state: &State) -> Transform {
         let target = self.turned_target(state.extras);
         let at = |s: &Spot| {
@@ -52,7 +53,8 @@ impl Points {
         fitted_frame_with_turns(self.spots.iter().map(|s| (at(s), seen(s), weight(s))), &turns)
     }
 
-    /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all directions.
+    /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all
+    /// directions.
     pub(super) fn start_is_best(&self) -> bool {
         /// Of the whitener: far above its rounding, far below any difference of weights.
         const ALIKE: f64 = 1e-12;
@@ -80,7 +82,8 @@ impl Points {
         Rotation3::from_scaled_axis(turn).into_inner() * self.flange_from_target
     }
 
-    /// From the mark point to what a spot shows of a body of several targets, base frame, mm; `None` where it shows the mark point.
+    /// From the mark point to what a spot shows of a body of several targets, base frame, mm; `None` where it shows the
+    /// mark point.
     fn on_body(place: &Place, flange_from_target: &Matrix3<f64>, spot: &Spot) -> Option<Vector3<f64>> {
         spot.on_body_mm.map(|part| place.rotation * (flange_from_target * part))
     }
@@ -100,7 +103,8 @@ impl Points {
         self.turned(state, frame).map(|(_, residual)| residual).collect()
     }
 
-    /// Of each spot what its orientation is off by, a rotation vector in the sensor's frame, rad, and its weight, 1/rad; `None` where it has none.
+    /// Of each spot what its orientation is off by, a rotation vector in the sensor's frame, rad, and its weight,
+    /// 1/rad; `None` where it has none.
     fn turns(&self, state: &State, frame: &Transform) -> impl Iterator<Item = Option<(Vector3<f64>, f64)>> {
         let (rotation, flange_from_target) = (rotation_matrix(frame), self.turned_target(state.extras));
         self.spots.iter().map(move |spot| {
@@ -124,7 +128,8 @@ impl Points {
         white
     }
 
-    /// Squares and products of the residuals and of their derivatives with respect to a small motion of the transform, spot by spot.
+    /// Squares and products of the residuals and of their derivatives with respect to a small motion of the transform,
+    /// spot by spot.
     pub(super) fn normal(&self, state: &State, frame: &Transform) -> Normal {
         if self.field.is_some() {
             return Normal::new(self.inner(state, frame));
@@ -252,7 +257,8 @@ mod tests {
     use crate::identify::sensor::Scatter;
     use crate::linear_algebra::solution;
 
-    /// Forty points of a robot along 300 mm, off the line by up to `off_mm`, and as a sensor reads them that stands turned about it.
+    /// Forty points of a robot along 300 mm, off the line by up to `off_mm`, and as a sensor reads them that stands
+    /// turned about it.
     fn along(off_mm: f64, sensor_from_base: Transform) -> (Points, Vec<Place>) {
         let at = |k: usize| {
             let k = k as f64;

@@ -1,7 +1,9 @@
-//! The rows of a data set under a residual model: the robot at their poses, and a block of residuals for each placement.
+//! The rows of a data set under a residual model: the robot at their poses, and a block of residuals for each
+//! placement.
 //!
-//! In: the data set, the rows to use with their weights, the model, the parameters that may move, the sensor's extra unknowns.
-//! Out: white residuals and derivatives with respect to all parameters and extras, the placements' unknowns eliminated.
+//! In: the data set, the rows to use with their weights, the model, the parameters that may move, the sensor's extra
+//! unknowns. Out: white residuals and derivatives with respect to all parameters and extras, the placements' unknowns
+//! eliminated.
 
 use std::collections::BTreeSet;
 
@@ -56,8 +58,9 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Builds the blocks. Rows whose group has nothing to measure from are left out.
-    /// Gravity has its levers on `load_chain`; `weights` are roots of the rows' weights, one a row of the data set, or none where all count fully.
+    /// Builds the blocks. Rows whose group has nothing to measure from are left out. Gravity has its levers on
+    /// `load_chain`; `weights` are roots of the rows' weights, one a row of the data set, or none where all count
+    /// fully.
     pub fn new(task: &Task, scatter: Scatter, weights: &[f64], load_chain: &Robot) -> Rows {
         let Task { set, robot, parameters, rows, .. } = *task;
         let mut used: Vec<usize> = rows.to_vec();
@@ -163,8 +166,8 @@ impl Rows {
         sum / count.max(1) as f64
     }
 
-    /// The same rows with the sensor's errors, the extra unknowns and what is smooth, fixed as they are at these offsets and taken off the
-    /// readings.
+    /// The same rows with the sensor's errors, the extra unknowns and what is smooth, fixed as they are at these
+    /// offsets and taken off the readings.
     pub fn with_sensor_fixed(&self, offsets: &[f64]) -> Rows {
         let state = self.state(offsets, false);
         let unknowns = self.unknowns(offsets);

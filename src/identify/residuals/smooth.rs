@@ -1,11 +1,13 @@
-//! A smooth error that the points of a placement share: what a sensor does to space, and what no model of the robot follows.
+//! A smooth error that the points of a placement share: what a sensor does to space, and what no model of the robot
+//! follows.
 //!
-//! In: the points of a placement with their whiteners, how large the error is and over which length it changes. Out: residuals and columns
-//! that are white under noise and smooth error together, and the error as far as it is known. It is a Gaussian process over the
-//! sensor's space, alike and independent along x, y and z, of correlation `exp(-d^2 / 2 length^2)` (Rasmussen and Williams, "Gaussian
-//! processes for machine learning", 2006, chapter 2), seen through its values at some of the points (Williams and Seeger, "Using
-//! the Nystrom method to speed up kernel machines", 2001): the cost is linear in the points.
-//! What goes wrong: what changes over less than the distance of those points counts as noise.
+//! In: the points of a placement with their whiteners, how large the error is and over which length it changes. Out:
+//! residuals and columns that are white under noise and smooth error together, and the error as far as it is known. It
+//! is a Gaussian process over the sensor's space, alike and independent along x, y and z, of correlation `exp(-d^2 / 2
+//! length^2)` (Rasmussen and Williams, "Gaussian processes for machine learning", 2006, chapter 2), seen through its
+//! values at some of the points (Williams and Seeger, "Using the Nystrom method to speed up kernel machines", 2001):
+//! the cost is linear in the points. What goes wrong: what changes over less than the distance of those points counts
+//! as noise.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, SymmetricEigen, Vector3};
 
@@ -39,7 +41,8 @@ pub struct Field {
 }
 
 impl Field {
-    /// Of points in the sensor's frame with their whiteners, `rows` residuals a point of which the first three are the point's.
+    /// Of points in the sensor's frame with their whiteners, `rows` residuals a point of which the first three are the
+    /// point's.
     pub fn new(points: &[(Point3<f64>, Matrix3<f64>)], rows: usize, error: SmoothError) -> Field {
         let places: Vec<Point3<f64>> = points.iter().map(|(p, _)| *p).collect();
         let whiteners: Vec<Matrix3<f64>> = points.iter().map(|(_, w)| *w).collect();
@@ -85,8 +88,8 @@ impl Field {
     }
 }
 
-/// Values of independent functions of unit variance at the points, whose products with themselves amount to the correlation: a row a
-/// point, a column a function.
+/// Values of independent functions of unit variance at the points, whose products with themselves amount to the
+/// correlation: a row a point, a column a function.
 pub fn functions(points: &[Point3<f64>], length_mm: f64) -> DMatrix<f64> {
     let chosen = spread_out(points);
     let correlation =

@@ -1,7 +1,8 @@
-//! Where the unknowns of a placement may be, before anything is fitted: how a body is turned on the flange, the anchor of a wire.
+//! Where the unknowns of a placement may be, before anything is fitted: how a body is turned on the flange, the anchor
+//! of a wire.
 //!
-//! In: what was measured, and the robot's places. Out: a start that gross errors hardly move, by reweighted least squares. What goes wrong: places on
-//! a line leave a turn about it, which stays where the decomposition puts it.
+//! In: what was measured, and the robot's places. Out: a start that gross errors hardly move, by reweighted least
+//! squares. What goes wrong: places on a line leave a turn about it, which stays where the decomposition puts it.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Point3, Rotation3, Vector3};
 
@@ -25,8 +26,9 @@ const TURN_ROUNDS: usize = 60;
 /// Change of a turn that ends the rounds, rad: a ten-thousandth of a millimetre at a metre.
 const TURN_STAYS_RAD: f64 = 1e-7;
 
-/// How the target, or a body of several, is turned on the flange, with the frame of each placement unknown. A pose that shows a part of the body
-/// says where it is only once the turn is known, and the turn is known from the frames: they are found from each other until neither moves.
+/// How the target, or a body of several, is turned on the flange, with the frame of each placement unknown. A pose that
+/// shows a part of the body says where it is only once the turn is known, and the turn is known from the frames: they
+/// are found from each other until neither moves.
 pub(super) fn turn_on_flange(lists: &[Vec<Spot>], places: &[Place]) -> Matrix3<f64> {
     let frames_with = |turn: Option<&Matrix3<f64>>| -> Vec<Transform> {
         lists.iter().map(|spots| robust_frame(spots, places, turn)).collect()
@@ -46,7 +48,8 @@ pub(super) fn turn_on_flange(lists: &[Vec<Spot>], places: &[Place]) -> Matrix3<f
     turn
 }
 
-/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way). Without a body's turn its mark points come first.
+/// A frame that gross errors hardly move: least sum of distances, by reweighting (Weiszfeld's way). Without a body's
+/// turn its mark points come first.
 fn robust_frame(spots: &[Spot], places: &[Place], turn: Option<&Matrix3<f64>>) -> Transform {
     let whole: Vec<&Spot> = spots.iter().filter(|spot| spot.on_body_mm.is_none()).collect();
     let spots = if turn.is_none() && whole.len() >= 3 { whole } else { spots.iter().collect() };
@@ -69,8 +72,8 @@ fn robust_frame(spots: &[Spot], places: &[Place], turn: Option<&Matrix3<f64>>) -
     frame
 }
 
-/// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the body, which stands in some
-/// direction from the mark point.
+/// Mean of `flange_from_target` over all poses: of those with an orientation, and of those that show a part of the
+/// body, which stands in some direction from the mark point.
 fn mean_target(lists: &[Vec<Spot>], frames: &[Transform], places: &[Place]) -> Matrix3<f64> {
     let mut sum = Matrix3::zeros();
     for (spots, frame) in lists.iter().zip(frames) {

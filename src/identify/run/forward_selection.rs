@@ -1,8 +1,8 @@
 //! Up the ladder of models: which terms the robot gets, and which unknowns of the sensor.
 //!
-//! In: the rows that may be fitted. Out: the terms that are worth taking, with the held-out error of all that were tried. From the
-//! nominal robot on the successor of least held-out error is taken that is worth its terms; the cells that say so are linearised anew
-//! where the model that was taken fits, and the selection goes on from there.
+//! In: the rows that may be fitted. Out: the terms that are worth taking, with the held-out error of all that were
+//! tried. From the nominal robot on the successor of least held-out error is taken that is worth its terms; the cells
+//! that say so are linearised anew where the model that was taken fits, and the selection goes on from there.
 
 use rayon::prelude::*;
 
@@ -27,7 +27,8 @@ pub struct Judged {
     pub of: Terms,
     /// Root mean square held-out error of a number, mm; `None` where it could not be judged.
     pub held_out_mm: Option<f64>,
-    /// The same of each way in which rows were held out: regions or placements first, then here and there, several times.
+    /// The same of each way in which rows were held out: regions or placements first, then here and there, several
+    /// times.
     pub by_way_mm: Vec<f64>,
 }
 
@@ -42,8 +43,8 @@ pub struct Certainty {
     pub of: usize,
 }
 
-/// How sure the choice of `terms` is: against the nominal robot, and against the model that comes nearest of those that do not contain it. Richer
-/// ones may have a little less error by chance: they must make the data more probable, too.
+/// How sure the choice of `terms` is: against the nominal robot, and against the model that comes nearest of those that
+/// do not contain it. Richer ones may have a little less error by chance: they must make the data more probable, too.
 pub fn certainty(judged: &[Judged], terms: &Terms) -> Vec<Certainty> {
     let Some(chosen) = judged.iter().find(|j| j.of == *terms) else { return Vec::new() };
     let against = |other: &Judged| Certainty {
@@ -121,9 +122,9 @@ impl Session<'_> {
             ways
         };
         let evidence = |terms: &Terms| regions.tolerance(&terms.parameters(self.robot)).1;
-        // Several are tried, so that what falls by chance must be probable, too; and of probable errors that whole placements share,
-        // or of a robot that nobody has found fault with, only what falls clearly counts: where regions or placements are held out, or
-        // every time that rows are held out here and there.
+        // Several are tried, so that what falls by chance must be probable, too; and of probable errors that whole
+        // placements share, or of a robot that nobody has found fault with, only what falls clearly counts: where
+        // regions or placements are held out, or every time that rows are held out here and there.
         let clearly = |new: &Ways, old: &Ways| {
             let falls: Vec<bool> = new.iter().zip(old).map(|(n, o)| clearly_less(n, o)).collect();
             falls.split_first().is_some_and(|(first, rest)| *first || !rest.is_empty() && rest.iter().all(|f| *f))
@@ -145,7 +146,8 @@ impl Session<'_> {
                 }
                 let Some(held_out) = judge(terms, judged) else { continue };
                 let new = (terms, held_out);
-                // Against what it contains a richer model has to be worth its terms; among others the least error decides.
+                // Against what it contains a richer model has to be worth its terms; among others the least error
+                // decides.
                 let better = next.as_ref().is_none_or(|pick| match terms.contains(&pick.0) {
                     true => worth(&new, pick),
                     false => root_mean_of(&new.1) < root_mean_of(&pick.1),
@@ -161,8 +163,8 @@ impl Session<'_> {
         Some(best)
     }
 
-    /// CrossValidation linearised where a formulation ended, at a scatter that need not be its own: regions or whole placements, and where it is regions
-    /// rows here and there as often as they are cut anew.
+    /// CrossValidation linearised where a formulation ended, at a scatter that need not be its own: regions or whole
+    /// placements, and where it is regions rows here and there as often as they are cut anew.
     pub(super) fn validations(&self, all: &[Parameter], at: &Formulation, scatter: Scatter) -> Vec<CrossValidation> {
         let (rows, linearised) = self.linearised(all, at, scatter);
         let regions = CrossValidation::by_regions(&linearised, &rows, self.set, self.settings.folds);
@@ -186,8 +188,8 @@ impl Session<'_> {
         (rows, linearised)
     }
 
-    /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at one and the same
-    /// scatter.
+    /// Takes the warps of cameras about whose errors nothing is stated where they make the data much more probable at
+    /// one and the same scatter.
     fn take_warps(
         &mut self,
         validations: Vec<CrossValidation>,

@@ -1,7 +1,8 @@
 //! What an identification ends with, how rows that took no part in the fit find it, and where the sensor stands.
 //!
-//! Errors are of the rows to verify, or without any of every row in the fits that it was left out of; they find the robot worse than the nominal one
-//! by more than another draw of rows would let expect or not (Student's test of the rows' differences).
+//! Errors are of the rows to verify, or without any of every row in the fits that it was left out of; they find the
+//! robot worse than the nominal one by more than another draw of rows would let expect or not (Student's test of the
+//! rows' differences).
 
 use std::collections::BTreeSet;
 
@@ -32,8 +33,8 @@ pub struct Candidate {
     /// What the problem looked like, and what came out; nothing of the nominal robot.
     pub found: Option<(Formulation, Solution)>,
     pub robot: Robot,
-    /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it does not, or
-    /// was not judged.
+    /// Root mean square held-out error of a number, mm, of the model where this ends at its least cost; `None` where it
+    /// does not, or was not judged.
     pub held_out_mm: Option<f64>,
 }
 
@@ -121,15 +122,17 @@ impl Identification {
         rows.into_iter().collect()
     }
 
-    /// Rows to verify that fit far worse than the rest and by which nothing is judged: one, or a tenth of them. More than that are no strays.
+    /// Rows to verify that fit far worse than the rest and by which nothing is judged: one, or a tenth of them. More
+    /// than that are no strays.
     pub fn strays(&self, set: &Dataset) -> &[usize] {
         let most = (set.verify_rows().len() / 10).max(1);
         if self.verify_outliers.len() <= most { &self.verify_outliers } else { &[] }
     }
 
-    /// Errors of a robot on rows that took no part in its fit: the rows to verify, or every row in the fits that it was left out of. A robot
-    /// that was `fitted` changes as the chosen one does where rows are left out; the nominal one does not. `judge` is for all fitted rows; rows to
-    /// verify that are `strays` are in no error, not even by the place that the others are judged from.
+    /// Errors of a robot on rows that took no part in its fit: the rows to verify, or every row in the fits that it was
+    /// left out of. A robot that was `fitted` changes as the chosen one does where rows are left out; the nominal one
+    /// does not. `judge` is for all fitted rows; rows to verify that are `strays` are in no error, not even by the
+    /// place that the others are judged from.
     pub fn held_out_errors(&self, judge: &Judge, robot: &Robot, fitted: bool, strays: &[usize]) -> Vec<RowError> {
         if self.deletions.is_empty() {
             let mut rows = judge.set.verify_rows();
@@ -152,8 +155,9 @@ impl Identification {
         folds::one_a_row(judge.set, self.deletions.iter().flat_map(part))
     }
 
-    /// How rows that took no part in the fit find the chosen robot against the nominal one: by points where there are any, in units of what
-    /// they are known to; by distances otherwise. Distances of points share the point that they start at, which is one draw.
+    /// How rows that took no part in the fit find the chosen robot against the nominal one: by points where there are
+    /// any, in units of what they are known to; by distances otherwise. Distances of points share the point that they
+    /// start at, which is one draw.
     pub fn against_nominal(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Against {
         if self.formulation().is_none() {
             return Against::NotWorse;
@@ -180,8 +184,8 @@ impl Identification {
         if mean > limit { Against::Worse } else { Against::Perhaps }
     }
 
-    /// The placements of the chosen robot. A robot that was found by distances, or kept nominal, is placed by a fit of points to it; `None` of
-    /// readings that are no points.
+    /// The placements of the chosen robot. A robot that was found by distances, or kept nominal, is placed by a fit of
+    /// points to it; `None` of readings that are no points.
     pub fn placed(&self, set: &Dataset, nominal: &Robot, settings: &Settings) -> Result<Option<Placed>, Error> {
         if set.kind != Kind::Positions {
             return Ok(None);
@@ -199,7 +203,8 @@ impl Identification {
         let count = formulation.parameters().len();
         let joints = nominal.joints.len();
         let shared = formulation.offsets_covariance(&|parameter| is_held(parameter, joints));
-        // A placement is for readings as they are read: the sensor's own errors stay in them. Where targets stand is none of these.
+        // A placement is for readings as they are read: the sensor's own errors stay in them. Where targets stand is
+        // none of these.
         let (mut offsets, mut sensor) = (of_robot[..count].to_vec(), vec![0.0; count]);
         for (extra, value) in formulation.rows.extras.iter().zip(formulation.extras()) {
             let of_target = match extra {

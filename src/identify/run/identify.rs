@@ -1,4 +1,5 @@
-//! The whole identification: gross errors named, models judged on samples that did not choose them, methods run and compared.
+//! The whole identification: gross errors named, models judged on samples that did not choose them, methods run and
+//! compared.
 //!
 //! 1. A robust fit names the rows that have no weight; they are left out, until the model that is chosen says whether they are far off
 //!    from it too. Verify rows are looked at too, named and kept.
@@ -152,14 +153,16 @@ impl Session<'_> {
             self.rows = self.set.fit_rows();
             gross = self.drop_outliers(by_points, &terms)?;
         } else if terms.chain > first.chain {
-            // Too few rows to look for them anew: a row that alone tells of a parameter is none where that parameter is fitted.
+            // Too few rows to look for them anew: a row that alone tells of a parameter is none where that parameter is
+            // fitted.
             gross = self.take_back(gross, by_points, &terms)?;
         }
         Ok((terms, judged, gross))
     }
 
-    /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what the robot
-    /// does wrong is as smooth, and a robot that is corrected is worth more than one about which less is certain.
+    /// A smooth error that the points of each placement share, where they tell of one. It comes after the terms: what
+    /// the robot does wrong is as smooth, and a robot that is corrected is worth more than one about which less is
+    /// certain.
     fn smooth_error(&self, model: Model, terms: &Terms) -> Result<Option<smooth::Detected>, Error> {
         let parameters = terms.parameters(self.robot);
         let at = Formulation::new(&self.task(&parameters, model))?;

@@ -1,16 +1,17 @@
 //! Rows held against what the other rows predict for them.
 //!
-//! In: a robust fit. Out: the rows that are gross errors, those that are doubtful, and the verify rows that are as far off. A row far from
-//! all others pulls the fit towards itself, and a fit that lets it go may leave it by more than its own error: the variance of the
-//! prediction counts as well as the row's own ("deletion residuals": Cook and Weisberg, "Residuals and influence in regression", 1982).
-//! What the others say of a row far from them is extrapolated, and what the model lacks grows with it as noise does: where the prediction is
-//! less certain than the reading, a row must be as many times further off, in its variance: up to the count of the numbers that predict it, for a
-//! prediction is a weighted sum of them, and where all that they scatter by is what the model lacks, pulling one way, its square is at most as
-//! many times the variance that independent errors would give it (Cauchy and Schwarz). A row is named against most of the others: where more
-//! than half of all would be left out, none is.
-//! A row that was left out goes back where the others predict it: within two thirds of the standard deviations that it was left out for,
-//! their size that of the other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a
-//! thousand would have such a row by chance.
+//! In: a robust fit. Out: the rows that are gross errors, those that are doubtful, and the verify rows that are as far
+//! off. A row far from all others pulls the fit towards itself, and a fit that lets it go may leave it by more than its
+//! own error: the variance of the prediction counts as well as the row's own ("deletion residuals": Cook and Weisberg,
+//! "Residuals and influence in regression", 1982). What the others say of a row far from them is extrapolated, and what
+//! the model lacks grows with it as noise does: where the prediction is less certain than the reading, a row must be as
+//! many times further off, in its variance: up to the count of the numbers that predict it, for a prediction is a
+//! weighted sum of them, and where all that they scatter by is what the model lacks, pulling one way, its square is at
+//! most as many times the variance that independent errors would give it (Cauchy and Schwarz). A row is named against
+//! most of the others: where more than half of all would be left out, none is. A row that was left out goes back where
+//! the others predict it: within two thirds of the standard deviations that it was left out for, their size that of the
+//! other rows' residuals. A row that was kept is doubtful where the others are so far from it as one set in a thousand
+//! would have such a row by chance.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -79,7 +80,8 @@ impl Robust<'_> {
         self.still_gross(out, sigmas)
     }
 
-    /// Which of the rows that were left out stay so: the others go back where the rest predict them. The fit is then one without those that stay.
+    /// Which of the rows that were left out stay so: the others go back where the rest predict them. The fit is then
+    /// one without those that stay.
     pub fn still_gross(&mut self, mut out: Vec<usize>, sigmas: f64) -> Vec<usize> {
         for _ in 0..ROUNDS {
             for &row in self.task.rows {
@@ -125,7 +127,8 @@ impl Robust<'_> {
         far.into_iter().collect()
     }
 
-    /// The same of placements of which no row is fitted: nothing says where they are but their own rows, of which most are right.
+    /// The same of placements of which no row is fitted: nothing says where they are but their own rows, of which most
+    /// are right.
     fn far_off_alone(&self, others: &[usize], sigmas: f64) -> Vec<usize> {
         let set = self.task.set;
         let mut far = Vec::new();
@@ -141,8 +144,8 @@ impl Robust<'_> {
         far
     }
 
-    /// All rows of the data set against what the others predict for them, of those that are not in the fit nothing; and the known distances of the
-    /// data set against what everything else says of them, in their own standard deviations.
+    /// All rows of the data set against what the others predict for them, of those that are not in the fit nothing; and
+    /// the known distances of the data set against what everything else says of them, in their own standard deviations.
     pub fn deleted(&self) -> (Vec<Deleted>, Vec<f64>) {
         let (rows, problem, prior) = self.linearised();
         let of_placement = |placement: &Placement| {
@@ -200,8 +203,8 @@ impl Robust<'_> {
     }
 }
 
-/// White square of a row's residual against what the others predict, extrapolation counted up to `most` times; `None` where hardly anything but
-/// the row itself says what it should be: rounding then decides what the others say.
+/// White square of a row's residual against what the others predict, extrapolation counted up to `most` times; `None`
+/// where hardly anything but the row itself says what it should be: rounding then decides what the others say.
 fn square_by_others(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64, most: f64) -> Option<f64> {
     let by_others = DMatrix::identity(fitted.len(), fitted.len()) - &leverage;
     if by_others.symmetric_eigenvalues().min() < LEAST_OTHERS {
@@ -211,11 +214,12 @@ fn square_by_others(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64, 
     Some(square / odds.clamp(1.0, most))
 }
 
-/// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it, and the largest variance
-/// of the prediction over that of the reading.
+/// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it,
+/// and the largest variance of the prediction over that of the reading.
 fn square_of_deleted(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64) -> Option<(f64, f64)> {
     let identity = DMatrix::identity(fitted.len(), fitted.len());
-    // Deleted residuals are (I - H)^-1 e, and the others predict with a variance of H (I - H)^-1, both times the weight.
+    // Deleted residuals are (I - H)^-1 e, and the others predict with a variance of H (I - H)^-1, both times the
+    // weight.
     let grown = Cholesky::new(&identity - &leverage)?;
     let residual = grown.solve(fitted);
     let predicted = grown.solve(&leverage);

@@ -1,8 +1,8 @@
 //! The identification as a least-squares problem: rows, base parameters, a box and a prior.
 //!
-//! A [`Problem`] whose vector holds the base parameters (mm, mrad), then the extra unknowns of the sensor, and whose residuals are
-//! white, the prior's rows below. Base parameters are spread over all parameters of the robot. Costs are scaled back to mm^2, so
-//! that unweighted data give eq. (12).
+//! A [`Problem`] whose vector holds the base parameters (mm, mrad), then the extra unknowns of the sensor, and whose
+//! residuals are white, the prior's rows below. Base parameters are spread over all parameters of the robot. Costs are
+//! scaled back to mm^2, so that unweighted data give eq. (12).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -83,9 +83,10 @@ impl<'a> Fit<'a> {
         (product(&jacobian, &jacobian), jacobian.tr_mul(&at_zero))
     }
 
-    /// How many numbers of points and of orientations its unknowns and placements have followed at `x` (the trace of the hat matrix over the rows of
-    /// either). Points that are known to a hundredth of a millimetre determine a robot nearly alone where orientations are known to a third of a
-    /// mrad: all that is lost is theirs. `None` where placements are not determined by their rows.
+    /// How many numbers of points and of orientations its unknowns and placements have followed at `x` (the trace of
+    /// the hat matrix over the rows of either). Points that are known to a hundredth of a millimetre determine a robot
+    /// nearly alone where orientations are known to a third of a mrad: all that is lost is theirs. `None` where
+    /// placements are not determined by their rows.
     pub(super) fn lost(&self, x: &[f64]) -> Option<[f64; 2]> {
         let linear = Linearised::new(&self.rows, &self.offsets(x));
         let own: usize = linear.placements.iter().map(|p| p.linear.design.ncols()).sum();

@@ -1,7 +1,8 @@
 //! From a data set to the problem that the solvers get: base parameters, row weights, scatter, prior and box.
 //!
-//! In: a [`Task`]. Out: [`Rows`] whose scatter makes the white residuals as large as they should be, base parameters, the prior of
-//! greatest evidence, and a box. The chain on which weights have their levers follows the fit, so that fit and written robot are one.
+//! In: a [`Task`]. Out: [`Rows`] whose scatter makes the white residuals as large as they should be, base parameters,
+//! the prior of greatest evidence, and a box. The chain on which weights have their levers follows the fit, so that fit
+//! and written robot are one.
 
 use std::borrow::Cow;
 
@@ -28,14 +29,16 @@ const ROUNDS: usize = 4;
 /// Rounds in which the fit may have come to where the poses determine more.
 const BASES: usize = 2;
 
-/// Rounds of estimating scatter and prior from the residuals at the most, and the change of the scatter's logarithm that ends them.
+/// Rounds of estimating scatter and prior from the residuals at the most, and the change of the scatter's logarithm
+/// that ends them.
 const ESTIMATES: usize = 10;
 const SAME_SCATTER: f64 = 0.01;
 
 /// A fit may end so far into the box before the box is widened.
 const NEAR_WALL: f64 = 0.95;
 
-/// Share (mrad a mm, where the others are angles) of a tool's place in a sum from which on the sum is as much the tool's.
+/// Share (mrad a mm, where the others are angles) of a tool's place in a sum from which on the sum is as much the
+/// tool's.
 const ALIKE: f64 = 0.5;
 
 /// The written robot is the fitted one when moving the levers' chain moves no parameter by more, mm or mrad.
@@ -65,7 +68,8 @@ pub struct Formulation {
     pub free_fit: Solution,
     /// Whether the data see the robot's size.
     pub scale_seen: bool,
-    /// How many times larger errors that rows share make the variances than independent ones would; one until it was looked for.
+    /// How many times larger errors that rows share make the variances than independent ones would; one until it was
+    /// looked for.
     pub common: f64,
 }
 
@@ -149,8 +153,8 @@ impl Formulation {
         Fit::new(rows, &self.base, self.spread(), &self.bounds, self.prior(&self.tolerance, &[]))
     }
 
-    /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together, the data's part as much larger as
-    /// errors that rows share make it.
+    /// Covariance of the unknowns (base parameters, extras), mm and mrad: data and prior together, the data's part as
+    /// much larger as errors that rows share make it.
     pub fn covariance(&self) -> DMatrix<f64> {
         self.covariance_with(&self.most)
     }
@@ -167,14 +171,15 @@ impl Formulation {
         self.with_common(pseudo_inverse(&data + prior.tr_mul(&prior)), data)
     }
 
-    /// A covariance that follows from independent errors, the part of the data as much larger as errors that rows share make it.
+    /// A covariance that follows from independent errors, the part of the data as much larger as errors that rows share
+    /// make it.
     fn with_common(&self, covariance: DMatrix<f64>, data: DMatrix<f64>) -> DMatrix<f64> {
         let more = &covariance * data * &covariance * (self.common - 1.0);
         covariance + more
     }
 
-    /// The data, linear in the unknowns (base parameters, extras), without a prior: the product of the white Jacobian with itself, and with
-    /// the white residuals at offset zero.
+    /// The data, linear in the unknowns (base parameters, extras), without a prior: the product of the white Jacobian
+    /// with itself, and with the white residuals at offset zero.
     pub fn normal(&self) -> (DMatrix<f64>, DVector<f64>) {
         let none = DMatrix::zeros(0, self.free_fit.x.len());
         Fit::free(&self.rows, &self.base, self.spread(), none).normal(&self.free_fit.x)
@@ -188,8 +193,8 @@ impl Formulation {
         &spread * of_base * spread.transpose()
     }
 
-    /// The same with what the poses tell next to nothing of: parameters that only act together, or that nothing saw, as uncertain as they were
-    /// before. At the poses that were fitted it makes no difference, at others it may.
+    /// The same with what the poses tell next to nothing of: parameters that only act together, or that nothing saw, as
+    /// uncertain as they were before. At the poses that were fitted it makes no difference, at others it may.
     pub fn whole_covariance(&self) -> DMatrix<f64> {
         let count = self.parameters().len();
         self.offsets_covariance(&|_| false).view((0, 0), (count, count)).into_owned()
@@ -242,8 +247,8 @@ struct Estimate<'a> {
 }
 
 impl<'a> Estimate<'a> {
-    /// From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not followed to the last
-    /// digit by a prior that makes room for it.
+    /// From the side of noise: what the parameters have not explained yet counts as scatter, so that a few rows are not
+    /// followed to the last digit by a prior that makes room for it.
     fn new(task: &'a Task<'a>) -> Result<Estimate<'a>, Error> {
         let load_chain = task.robot.clone();
         let scatter = Scatter { smooth: task.smooth, ..Scatter::of_point(FIRST_SCATTER_MM) };
@@ -337,7 +342,8 @@ mod tests {
     use crate::identify::synthetic;
     use crate::robot::corrections::LoadPoint;
 
-    /// Levers on a chain that is not the fitted one would bend the written robot otherwise than the one that was fitted.
+    /// Levers on a chain that is not the fitted one would bend the written robot otherwise than the one that was
+    /// fitted.
     #[test]
     fn the_levers_of_a_robot_that_sags_are_on_the_robot_that_was_fitted() {
         let sag = |robot: &mut Robot| {

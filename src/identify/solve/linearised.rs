@@ -1,10 +1,11 @@
 //! The least-squares problem linearised: what sessions, gross errors, folds and smooth errors ask without fitting anew.
 //!
-//! In: rows, and the offsets (parameters of the robot, then extra unknowns of the sensor) at which they are linear. Out: for each placement its
-//! white residuals with the columns of the shared unknowns and of its own, from which follow: normal matrices of any selection of its rows
-//! with more columns where wanted, the shared unknowns' normal matrix with the placement's own eliminated, and what fresh columns
-//! (another placement from some row on, an even drift) would gain.
-//! What goes wrong: where the shared unknowns move the residuals by so much that a linear model does not hold, all of it is only as good as that.
+//! In: rows, and the offsets (parameters of the robot, then extra unknowns of the sensor) at which they are linear.
+//! Out: for each placement its white residuals with the columns of the shared unknowns and of its own, from which
+//! follow: normal matrices of any selection of its rows with more columns where wanted, the shared unknowns' normal
+//! matrix with the placement's own eliminated, and what fresh columns (another placement from some row on, an even
+//! drift) would gain. What goes wrong: where the shared unknowns move the residuals by so much that a linear model does
+//! not hold, all of it is only as good as that.
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -76,7 +77,8 @@ impl Placement {
         product(&all, &all)
     }
 
-    /// Product of [shared unknowns, own unknowns] with itself; `others` is what the other placements add to the shared ones.
+    /// Product of [shared unknowns, own unknowns] with itself; `others` is what the other placements add to the shared
+    /// ones.
     pub fn with_others(&self, others: &DMatrix<f64>) -> DMatrix<f64> {
         let Linear { jacobian, design, .. } = &*self.linear;
         let (shared, own) = (jacobian.ncols(), design.ncols());

@@ -1,7 +1,8 @@
-//! A fit that gross errors cannot get past: iteratively reweighted least squares with Tukey's biweight, its scale from the median of
-//! the residuals, after a start by least absolute residuals (Holland and Welsch, 1977).
+//! A fit that gross errors cannot get past: iteratively reweighted least squares with Tukey's biweight, its scale from
+//! the median of the residuals, after a start by least absolute residuals (Holland and Welsch, 1977).
 //!
-//! In: a [`Task`]. Out: weights, sizes of residuals in robust standard deviations, the robot and the scatter of the rest.
+//! In: a [`Task`]. Out: weights, sizes of residuals in robust standard deviations, the robot and the scatter of the
+//! rest.
 
 use nalgebra::DMatrix;
 
@@ -37,13 +38,15 @@ const ROUNDS_A_FACTOR: usize = 4;
 /// Tukey's constant, in standard deviations: 95 % efficient for one normal number.
 const BIWEIGHT: f64 = 4.685;
 
-/// At least one number in so many counts as a degree of freedom, however many parameters there are: the prior holds them.
+/// At least one number in so many counts as a degree of freedom, however many parameters there are: the prior holds
+/// them.
 pub const LEAST_FREEDOM: usize = 4;
 
 impl<'a> Task<'a> {
-    /// A fit that gross errors cannot get past, from the nominal robot. The scale that a residual is held against follows the median
-    /// while influence is only bounded, and stays as it is while large residuals lose all weight (Yohai, "High breakdown-point and high
-    /// efficiency robust estimates for regression", 1987): a scale that followed would shrink around the rows that happen to fit.
+    /// A fit that gross errors cannot get past, from the nominal robot. The scale that a residual is held against
+    /// follows the median while influence is only bounded, and stays as it is while large residuals lose all weight
+    /// (Yohai, "High breakdown-point and high efficiency robust estimates for regression", 1987): a scale that followed
+    /// would shrink around the rows that happen to fit.
     pub fn robust(&self, loss: Loss) -> Result<Robust<'a>, Error> {
         let (scatter, count) = (Scatter::of_point(FIRST_SCATTER_MM), self.set.poses.len());
         let rows = self.rows_at(scatter, self.robot);
@@ -82,8 +85,8 @@ impl<'a> Task<'a> {
         Ok(robust)
     }
 
-    /// What is left of the robot as it is, with nothing but the sensor placed: mean size a coordinate, mm, after a few rounds of bounded
-    /// influence, or the first figure that is beyond `hopeless_mm`.
+    /// What is left of the robot as it is, with nothing but the sensor placed: mean size a coordinate, mm, after a few
+    /// rounds of bounded influence, or the first figure that is beyond `hopeless_mm`.
     pub fn unfitted_mm(&self, hopeless_mm: f64) -> f64 {
         typical_mm(&self.unfitted(hopeless_mm))
     }
@@ -105,8 +108,8 @@ impl<'a> Task<'a> {
         residuals
     }
 
-    /// Sizes of what is left of the robot as it is, in standard deviations of `least` or, where these rows scatter by more, of theirs; one
-    /// a row of the data set.
+    /// Sizes of what is left of the robot as it is, in standard deviations of `least` or, where these rows scatter by
+    /// more, of theirs; one a row of the data set.
     pub fn unfitted_sizes(&self, least: Scatter) -> Vec<f64> {
         let (residuals, count) = (self.unfitted(f64::INFINITY), self.set.poses.len());
         let own = robust_scatter(&residuals, self.rows, count, 1.0, least, false);
@@ -171,8 +174,8 @@ impl Robust<'_> {
         self.robot = task.robot.shifted(task.parameters, &self.offsets);
     }
 
-    /// The same fit with no residual counting for more than one of `cap` robust standard deviations: with bounded influence alone a row that
-    /// is off by a thousand still holds more of the sum of squares than all the others.
+    /// The same fit with no residual counting for more than one of `cap` robust standard deviations: with bounded
+    /// influence alone a row that is off by a thousand still holds more of the sum of squares than all the others.
     pub fn capped(mut self, cap: f64) -> Self {
         let beyond: Vec<usize> = self.task.rows.iter().copied().filter(|&row| self.scores[row] > cap).collect();
         for &row in &beyond {
@@ -196,7 +199,8 @@ impl Robust<'_> {
         (numbers as f64 / left.max(1) as f64).sqrt()
     }
 
-    /// The rows with their weights, linearised where the fit ended, and the normal matrix of a loose prior on all parameters.
+    /// The rows with their weights, linearised where the fit ended, and the normal matrix of a loose prior on all
+    /// parameters.
     pub fn linearised(&self) -> (Rows, Linearised, DMatrix<f64>) {
         let rows = self.rows();
         let count = self.offsets.len();

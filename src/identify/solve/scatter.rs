@@ -1,9 +1,9 @@
 //! How large residuals are: the size of a row as that of one normal number, and the scatter that explains them.
 //!
-//! In: residuals before whitening. Out: sizes of rows, their robust standard deviation, and the scatter at which the white sum of squares
-//! equals the degrees of freedom. The covariance of a row is `stated * C + point^2 I`, C the one of the file. Of all pairs with the
-//! right sum of squares the one of least determinant is the most probable; where the data do not tell the two apart, C is taken at
-//! its word, though it leave a smaller sum of squares than expected.
+//! In: residuals before whitening. Out: sizes of rows, their robust standard deviation, and the scatter at which the
+//! white sum of squares equals the degrees of freedom. The covariance of a row is `stated * C + point^2 I`, C the one
+//! of the file. Of all pairs with the right sum of squares the one of least determinant is the most probable; where the
+//! data do not tell the two apart, C is taken at its word, though it leave a smaller sum of squares than expected.
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
@@ -11,8 +11,8 @@ use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{EVIDENCE, Raw, Scatter};
 use crate::statistics::median;
 
-/// Least scatter, mm and rad: below any instrument that reads a robot. Exact data would weigh so much that what decides between models and
-/// tolerances, a difference of sums of squares of all offsets, is lost in rounding.
+/// Least scatter, mm and rad: below any instrument that reads a robot. Exact data would weigh so much that what decides
+/// between models and tolerances, a difference of sums of squares of all offsets, is lost in rounding.
 pub(super) const LEAST_MM: f64 = 1e-5;
 const LEAST_RAD: f64 = 1e-7;
 
@@ -22,8 +22,8 @@ const LARGEST_MM: f64 = 1e5;
 /// Factors of the stated covariances that are tried.
 const STATED: [f64; 10] = [1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0];
 
-/// Stated covariances count as too large where the residuals ask for less than this share of them; a little less is what errors common to
-/// many rows look like, which scatter does not show.
+/// Stated covariances count as too large where the residuals ask for less than this share of them; a little less is
+/// what errors common to many rows look like, which scatter does not show.
 const OVERSTATED: f64 = 0.4;
 
 /// How many standard deviations below nothing a variance is taken to be at the most.
@@ -97,7 +97,8 @@ impl Residual {
     }
 }
 
-/// White size of each row's residual in so many standard deviations, brought to the size of one normal number; zero for rows without one.
+/// White size of each row's residual in so many standard deviations, brought to the size of one normal number; zero for
+/// rows without one.
 pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, scale: f64, count: usize) -> Vec<f64> {
     let mut squares = vec![0.0; count];
     for residual in residuals {
@@ -108,7 +109,8 @@ pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, scale: f64, count
     squares.into_iter().map(f64::sqrt).collect()
 }
 
-/// A chi-squared of three degrees of freedom as one of a single degree that is exceeded as often (Wilson and Hilferty, 1931).
+/// A chi-squared of three degrees of freedom as one of a single degree that is exceeded as often (Wilson and Hilferty,
+/// 1931).
 pub(super) fn as_one_number(square: f64) -> f64 {
     let (three, one) = (2.0 / 27.0, 2.0 / 9.0);
     let z = ((square / 3.0).cbrt() - (1.0 - three)) / f64::sqrt(three);
@@ -116,7 +118,8 @@ pub(super) fn as_one_number(square: f64) -> f64 {
     (1.0 - one + z * f64::sqrt(one)).max(1e-3).powi(3)
 }
 
-/// The standard deviation in which the median of these rows' sizes is what it should be, `freedom` times what the fit left.
+/// The standard deviation in which the median of these rows' sizes is what it should be, `freedom` times what the fit
+/// left.
 pub(super) fn robust_scale(
     residuals: &[Residual],
     rows: &[usize],
@@ -140,8 +143,8 @@ fn median_size(sizes: &[f64], rows: &[usize]) -> f64 {
     median(rows.iter().map(|&r| sizes[r]).filter(|s| *s > 0.0)).map_or(0.0, |middle| middle / 0.6745)
 }
 
-/// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the fit left. With
-/// `both` the factor of the stated covariances is looked for as well.
+/// The scatter at which the median residual of these rows has the size that it should have, `freedom` times what the
+/// fit left. With `both` the factor of the stated covariances is looked for as well.
 pub(super) fn robust_scatter(
     residuals: &[Residual],
     rows: &[usize],
@@ -158,8 +161,9 @@ pub(super) fn robust_scatter(
     }
 }
 
-/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and orientations apart. `lost` is
-/// what the fit took of either; where it is not known, each number loses the same share to parameters and placements.
+/// The scatter at which the white sum of squares equals the degrees of freedom (Pearson's equation); for points and
+/// orientations apart. `lost` is what the fit took of either; where it is not known, each number loses the same share
+/// to parameters and placements.
 pub(super) fn estimate_scatter(
     rows: &Rows,
     offsets: &[f64],
@@ -192,8 +196,9 @@ pub(super) fn estimate_scatter(
     Scatter { hidden_mm2, fresh_sd_mm2, freedom: wanted, ..scatter }
 }
 
-/// By how much the expectation of the scatter's variance is above the one that was found, and its standard deviation, mm^2: residuals tell it to within
-/// one that the readings' own noise makes, and it is not negative. `left` is the share of the numbers that the fit left.
+/// By how much the expectation of the scatter's variance is above the one that was found, and its standard deviation,
+/// mm^2: residuals tell it to within one that the readings' own noise makes, and it is not negative. `left` is the
+/// share of the numbers that the fit left.
 fn hidden(residuals: &[Residual], left: f64, scatter: &Scatter) -> (f64, f64) {
     let (mut score, mut information) = (0.0, 0.0);
     for residual in residuals {
@@ -227,8 +232,9 @@ fn with_point(before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
     scatter
 }
 
-/// Of the pairs of factor and scatter that leave nothing in excess the most probable one, where it is clearly more so than covariances taken at
-/// their word, and than these made smaller by what the residuals leave; `left` is the share of the numbers that the fit left.
+/// Of the pairs of factor and scatter that leave nothing in excess the most probable one, where it is clearly more so
+/// than covariances taken at their word, and than these made smaller by what the residuals leave; `left` is the share
+/// of the numbers that the fit left.
 fn most_probable(residuals: &[Residual], before: Scatter, left: f64, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
     let at = |stated: f64| Scatter { point_mm: LEAST_MM, stated, ..before };
     if residuals.iter().all(|r| r.numbers().iter().all(|n| n.variance <= 0.0)) {
@@ -284,7 +290,8 @@ mod tests {
         assert_eq!(scatter.stated, 1.0);
     }
 
-    /// Residuals that are all a little smaller than their covariances say were taken for scatter, and the covariances for nothing.
+    /// Residuals that are all a little smaller than their covariances say were taken for scatter, and the covariances
+    /// for nothing.
     #[test]
     fn residuals_a_little_too_small_leave_covariances_at_their_word() {
         for stated in [Vector3::repeat(0.02), Vector3::new(0.05, 0.04, 0.3)] {

@@ -18,11 +18,13 @@ use crate::robot::{Parameter, Robot, Unit};
 /// Scatter before anything is known, mm: about a good robot's after calibration.
 pub const FIRST_SCATTER_MM: f64 = 0.1;
 
-/// How far the target must lie from where the file has it that what turns about it is worth a look: a mrad at such a lever is a micrometre.
+/// How far the target must lie from where the file has it that what turns about it is worth a look: a mrad at such a
+/// lever is a micrometre.
 const FAR_MM: f64 = 1.0;
 
 impl<'a> Task<'a> {
-    /// These parameters on all fitted rows, as they are read: how measurements are looked at before it is known what is in them.
+    /// These parameters on all fitted rows, as they are read: how measurements are looked at before it is known what is
+    /// in them.
     pub fn plain(
         set: &'a Dataset,
         robot: &'a Robot,
@@ -59,10 +61,11 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// What they determine where the target really is, if that is more than where the file has it: a target on the last axes hides what turns
-    /// about it. `None` where these offsets do not move it far enough to matter.
+    /// What they determine where the target really is, if that is more than where the file has it: a target on the last
+    /// axes hides what turns about it. `None` where these offsets do not move it far enough to matter.
     fn richer(&self, rows: &Rows, offsets: &[f64], base: &Base) -> Option<Base> {
-        // The rest of the robot stays nominal: what one orientation of the flange hides is not seen because the links are a little off.
+        // The rest of the robot stays nominal: what one orientation of the flange hides is not seen because the links
+        // are a little off.
         let mut of_target = vec![0.0; rows.offset_count()];
         for ((at, &offset), parameter) in of_target.iter_mut().zip(offsets).zip(self.parameters) {
             if matches!(parameter, Parameter::V(_)) {
@@ -86,7 +89,8 @@ impl<'a> Task<'a> {
             Redundancy::Qr => Base::new(&jacobian, self.settings.rank_tolerance),
             Redundancy::Correlation => Base::by_correlation(&jacobian, self.settings.rank_tolerance),
         };
-        // Identical poses leave columns of rounding errors, whose rank means nothing: judge their size in mm a mm or mrad.
+        // Identical poses leave columns of rounding errors, whose rank means nothing: judge their size in mm a mm or
+        // mrad.
         let largest = jacobian.column_iter().map(|c| c.norm()).fold(0.0, f64::max);
         let strength = largest * rows.unit_variance_mm2().sqrt() / (jacobian.nrows().max(1) as f64).sqrt();
         if base.rank() == 0 || strength <= self.settings.rank_tolerance {
@@ -95,8 +99,8 @@ impl<'a> Task<'a> {
         Ok(base)
     }
 
-    /// Too few numbers to calibrate anything: not more than offsets of all joints, a tool and three more to judge by; without
-    /// a prior, not more than base parameters.
+    /// Too few numbers to calibrate anything: not more than offsets of all joints, a tool and three more to judge by;
+    /// without a prior, not more than base parameters.
     pub(super) fn check_count(&self, rows: &Rows, base: &Base) -> Result<(), Error> {
         let numbers = rows.count();
         let least = match self.settings.prior {
@@ -119,8 +123,9 @@ impl<'a> Task<'a> {
 /// Standard deviation of the mean relative change of all lengths where nothing measured sees it.
 const HELD_SCALE: f64 = 1e-7;
 
-/// Rows of the prior of these unknowns, none where it is not `held`; and of a robot whose scale nothing sees one more below: as a whole it neither
-/// grows nor shrinks. Touches of unknown points fit the better the smaller all lengths are, and a weak prior would let them collapse.
+/// Rows of the prior of these unknowns, none where it is not `held`; and of a robot whose scale nothing sees one more
+/// below: as a whole it neither grows nor shrinks. Touches of unknown points fit the better the smaller all lengths
+/// are, and a weak prior would let them collapse.
 pub(super) fn prior_rows(
     tolerance: &Tolerance,
     base: &Base,

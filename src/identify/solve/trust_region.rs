@@ -1,11 +1,11 @@
 //! Trust-region Levenberg-Marquardt in a box.
 //!
 //! Source: the exact step of J. J. More, "The Levenberg-Marquardt algorithm: implementation and theory" (1978), with
-//! scaling by the largest column norms seen; bounds by an active set in the manner of Lin and More, "Newton's method for large
-//! bound-constrained problems" (1999): variables that the gradient presses against their bound are held, a step that
-//! leaves the box is cut at the wall and computed anew for the rest.
-//! The step comes from a singular value decomposition of R (J = QR), so that the condition number is not squared.
-//! What goes wrong: a local minimum is as good as any; the caller sees the stop reason.
+//! scaling by the largest column norms seen; bounds by an active set in the manner of Lin and More, "Newton's method
+//! for large bound-constrained problems" (1999): variables that the gradient presses against their bound are held, a
+//! step that leaves the box is cut at the wall and computed anew for the rest. The step comes from a singular value
+//! decomposition of R (J = QR), so that the condition number is not squared. What goes wrong: a local minimum is as
+//! good as any; the caller sees the stop reason.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -76,7 +76,8 @@ struct Local<'a> {
 }
 
 impl Local<'_> {
-    /// Takes the first step that lowers the cost as predicted, from ever smaller radii; why the search ends there, where it does.
+    /// Takes the first step that lowers the cost as predicted, from ever smaller radii; why the search ends there,
+    /// where it does.
     fn step(
         &self,
         x: &mut Vec<f64>,
@@ -92,7 +93,8 @@ impl Local<'_> {
             let taken = DVector::from_fn(x.len(), |i, _| candidate[i] - x[i]);
             let predicted = cost - 0.5 * (residuals + jacobian * &taken).norm_squared();
             let length = scaled_norm(taken.as_slice(), scale);
-            // Not `linearised`: a faster way to the cost may round differently, and reductions near rounding decide the end.
+            // Not `linearised`: a faster way to the cost may round differently, and reductions near rounding decide the
+            // end.
             let new_cost = 0.5 * problem.residuals(&candidate).norm_squared();
             *evaluations += 1;
             let actual = cost - new_cost;
@@ -132,7 +134,8 @@ impl Local<'_> {
         })
     }
 
-    /// The step that minimises the linear model within the radius and the box, by successive fixing of what hits a wall.
+    /// The step that minimises the linear model within the radius and the box, by successive fixing of what hits a
+    /// wall.
     fn step_in_box(&self, x: &[f64], radius: f64) -> DVector<f64> {
         let Local { problem, residuals, jacobian, scale, .. } = *self;
         let (lower, upper) = (problem.lower(), problem.upper());

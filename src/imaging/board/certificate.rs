@@ -1,4 +1,5 @@
-//! The board as its certificate describes it: a plain checkerboard, one whose light squares hold markers that number its corners, or a grid of tags.
+//! The board as its certificate describes it: a plain checkerboard, one whose light squares hold markers that number
+//! its corners, or a grid of tags.
 
 use std::ops::RangeInclusive;
 
@@ -15,7 +16,8 @@ use crate::imaging::lattice::turned_place;
 /// Sides of squares, mm: from a wafer's to a car park's.
 pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
 
-/// How much higher or lower than wide a square may be, as a share: printers stretch by less, and what is off by more is another board.
+/// How much higher or lower than wide a square may be, as a share: printers stretch by less, and what is off by more is
+/// another board.
 pub const MOST_STRETCH: f64 = 0.03;
 
 /// What tells a board's corners apart.
@@ -32,8 +34,9 @@ pub enum Kind {
         /// Which squares hold the markers, where that is said; else it is what is seen.
         layout: Option<Layout>,
     },
-    /// Kalibr's AprilGrid: tags with black squares in the corners between them. Where dark and light meet it is a checkerboard whose squares are a tag and
-    /// a gap wide in turn; the outermost are gaps. OpenCV's grid of tags is the same without the black squares.
+    /// Kalibr's AprilGrid: tags with black squares in the corners between them. Where dark and light meet it is a
+    /// checkerboard whose squares are a tag and a gap wide in turn; the outermost are gaps. OpenCV's grid of tags is
+    /// the same without the black squares.
     Tags {
         /// Width of a gap, mm.
         gap_mm: f64,
@@ -41,8 +44,8 @@ pub enum Kind {
         family: Dictionary,
         /// Whose grid it is, where that is said; else Kalibr's until OpenCV's is seen.
         layout: Option<Layout>,
-        /// By how much each side of a tag of OpenCV's grid is printed farther out than it is drawn, mm: what black runs. Where two black squares meet it
-        /// moves nothing.
+        /// By how much each side of a tag of OpenCV's grid is printed farther out than it is drawn, mm: what black
+        /// runs. Where two black squares meet it moves nothing.
         spread_mm: f32,
     },
 }
@@ -76,7 +79,8 @@ impl Board {
         Board { squares, square_mm, stretch: 1.0, kind: Kind::Checker }
     }
 
-    /// True for a board whose markers number its corners: any of them may be seen, in both pictures of a pair or in one.
+    /// True for a board whose markers number its corners: any of them may be seen, in both pictures of a pair or in
+    /// one.
     pub fn is_coded(&self) -> bool {
         self.kind != Kind::Checker
     }
@@ -134,7 +138,8 @@ impl Board {
         }
     }
 
-    /// The grid of tags printed with another spread of black, in steps of a hundred-thousandth of a tag at the most: lengths that people read hold it.
+    /// The grid of tags printed with another spread of black, in steps of a hundred-thousandth of a tag at the most:
+    /// lengths that people read hold it.
     pub fn with_spread_mm(self, spread_mm: f64) -> Board {
         let Kind::Tags { gap_mm, family, layout, .. } = self.kind else { return self };
         let steps = 10f64.powi((1e-5 * self.square_mm).log10().floor() as i32).recip();
@@ -212,7 +217,8 @@ impl Board {
         [self.columns() / 2, self.rows() / 2]
     }
 
-    /// Distance of two lines of corners that are so many lines apart, the first of them the first of the board, mm: along x, along y.
+    /// Distance of two lines of corners that are so many lines apart, the first of them the first of the board, mm:
+    /// along x, along y.
     pub fn spans_mm(&self, lines: usize) -> [f64; 2] {
         // Both are sides of tags: black spreads away from between them, or moves both alike.
         let spread_mm = if lines.is_multiple_of(2) { 0.0 } else { 2.0 * self.spread_mm() };
@@ -252,7 +258,8 @@ impl Board {
         (index % self.columns(), index / self.columns())
     }
 
-    /// A corner's number as the programs count whose boards they are: ChArUco's row by row, Kalibr's four to a tag, counter-clockwise from its lower left.
+    /// A corner's number as the programs count whose boards they are: ChArUco's row by row, Kalibr's four to a tag,
+    /// counter-clockwise from its lower left.
     pub fn id(&self, col: usize, row: usize) -> usize {
         match self.kind {
             Kind::Checker | Kind::Charuco { .. } => self.index(col, row),
@@ -299,9 +306,9 @@ impl Board {
         }
     }
 
-    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does. That is a half turn at the most
-    /// where both counts of squares are odd, or both even: an odd number of squares one way only swaps black and white. Markers tell a board from its
-    /// turned self.
+    /// The smallest turn, in quarter turns, after which the board looks the same; `None` where only a whole turn does.
+    /// That is a half turn at the most where both counts of squares are odd, or both even: an odd number of squares one
+    /// way only swaps black and white. Markers tell a board from its turned self.
     pub fn symmetry(&self) -> Option<usize> {
         let Squares { columns, rows } = self.squares;
         let is_alike = !self.is_coded() && columns % 2 == rows % 2;
@@ -313,16 +320,16 @@ impl Board {
         self.symmetry().map_or(vec![0], |step| (0..4).step_by(step).collect())
     }
 
-    /// The place, column and row, that a corner has after the board was turned in its plane by so many quarter turns; a board with unequal sides
-    /// takes half turns only.
+    /// The place, column and row, that a corner has after the board was turned in its plane by so many quarter turns; a
+    /// board with unequal sides takes half turns only.
     pub fn turned(&self, (col, row): (usize, usize), quarters: usize) -> (usize, usize) {
         let last = (self.columns() as isize - 1, self.rows() as isize - 1);
         let (col, row) = turned_place((col as isize, row as isize), last, quarters);
         (col as usize, row as usize)
     }
 
-    /// Quarter turns after which the board's outline is the same, whatever its colours: all four of a square board, none and two of another;
-    /// none but the first where every corner has a number of its own.
+    /// Quarter turns after which the board's outline is the same, whatever its colours: all four of a square board,
+    /// none and two of another; none but the first where every corner has a number of its own.
     pub fn turns_of_outline(&self) -> Vec<usize> {
         let own_step = if self.columns() == self.rows() { 1 } else { 2 };
         (0..4).step_by(if self.is_coded() { 4 } else { own_step }).collect()

@@ -1,6 +1,7 @@
 //! Codes of markers: OpenCV's dictionaries by OpenCV's names. No other file names the crate that holds them.
 //!
-//! In: the bits of a marker as they are seen, row by row. Out: which marker of which dictionary has them, and how it is turned.
+//! In: the bits of a marker as they are seen, row by row. Out: which marker of which dictionary has them, and how it is
+//! turned.
 
 use std::fmt;
 
@@ -38,7 +39,8 @@ impl Dictionary {
         })
     }
 
-    /// The family of AprilTags of this name: `tag36h11`, as its makers write it, `t36h11` as Kalibr does, or OpenCV's name.
+    /// The family of AprilTags of this name: `tag36h11`, as its makers write it, `t36h11` as Kalibr does, or OpenCV's
+    /// name.
     pub fn of_tags(text: &str) -> Result<Dictionary, String> {
         let lower = text.to_ascii_lowercase();
         let size = lower.strip_prefix("tag").or_else(|| lower.strip_prefix('t')).unwrap_or(&lower);

@@ -60,8 +60,8 @@ impl Layout {
         }
     }
 
-    /// The number of the marker in a square that holds one, on a board of so many squares: they count row by row, Kalibr's tags from the lowest
-    /// row up.
+    /// The number of the marker in a square that holds one, on a board of so many squares: they count row by row,
+    /// Kalibr's tags from the lowest row up.
     pub fn number(self, Squares { columns, rows }: Squares, x: usize, y: usize) -> usize {
         // Of two rows one holds the larger half.
         let first = match self {
@@ -77,7 +77,8 @@ impl Layout {
 /// How a board's markers are printed: what a corner's window must leave out, and what is to be said.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Print {
-    /// Side of what a square holds beside its own colour, as a share of the square's: of a marker, of a tag's bits without its border.
+    /// Side of what a square holds beside its own colour, as a share of the square's: of a marker, of a tag's bits
+    /// without its border.
     pub share: f64,
     /// How far apart the lines of corners are.
     pub pitch: Pitch,

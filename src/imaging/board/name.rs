@@ -39,8 +39,9 @@ impl TryFrom<String> for Board {
 impl FromStr for Board {
     type Err = Error;
 
-    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a board with markers
-    /// are counted as printed: columns first. A square that is not quite one has a width and a height: `checker:20x20:10x10.01`.
+    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a
+    /// board with markers are counted as printed: columns first. A square that is not quite one has a width and a
+    /// height: `checker:20x20:10x10.01`.
     fn from_str(text: &str) -> Result<Board, Error> {
         let refuse = |why: String| Error::Name { found: text.to_owned(), why };
         let (kind, rest) = text.split_once(':').ok_or_else(|| refuse(without_colon(text)))?;
@@ -127,7 +128,8 @@ fn sides_mm(text: &str) -> Result<(f64, f64), String> {
     if is_square { Ok((width, stretch)) } else { Err(format!("`{text}` is no square")) }
 }
 
-/// Widths of gaps, in sides of a tag: black squares that are wider than the tags between them, or narrower than their bits, are no grid of tags.
+/// Widths of gaps, in sides of a tag: black squares that are wider than the tags between them, or narrower than their
+/// bits, are no grid of tags.
 const GAPS: std::ops::RangeInclusive<f64> = 0.1..=1.0;
 
 impl Board {

@@ -1,7 +1,8 @@
 //! How far apart the lines of a board's corners are.
 //!
-//! In: the kind of a board. Out: where its lines lie, in sides of a square or a tag. Squares follow one another evenly. Tags have gaps between
-//! them, so that the lines of their corners are a tag and a gap apart in turn; a lattice of them begins with a tag.
+//! In: the kind of a board. Out: where its lines lie, in sides of a square or a tag. Squares follow one another evenly.
+//! Tags have gaps between them, so that the lines of their corners are a tag and a gap apart in turn; a lattice of them
+//! begins with a tag.
 
 /// How the lines of corners follow one another.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,8 +1,9 @@
 //! What a caliper says of a printed board.
 //!
-//! In: the printed extent from the outer edge of the first to that of the last square, across and along, and the board as drawn. Out: the board as
-//! printed (width and height have scales of their own), and how well its lengths are known. Goes wrong: an extent that is not this board's, which is
-//! named: another extent of it, exchanged sides, a print not in true size, other counts.
+//! In: the printed extent from the outer edge of the first to that of the last square, across and along, and the board
+//! as drawn. Out: the board as printed (width and height have scales of their own), and how well its lengths are known.
+//! Goes wrong: an extent that is not this board's, which is named: another extent of it, exchanged sides, a print not
+//! in true size, other counts.
 
 use std::str::FromStr;
 

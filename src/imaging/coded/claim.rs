@@ -1,10 +1,12 @@
-//! Two parts of a picture that claim the same corners of the board at different places: two boards, or one of them was put together wrongly.
+//! Two parts of a picture that claim the same corners of the board at different places: two boards, or one of them was
+//! put together wrongly.
 //!
-//! In: both as places on the board. Out: that there are two boards, or the part to keep. Method: a part's own homography says where the board's lines are in
-//! the whole picture. Corners of the same board lie where these cross, whatever their numbers are; those of another board lie beyond its sides,
-//! or anywhere on it. Squares that are seen so obliquely that their long sides are several times the short ones are put together wrongly
-//! now and then: corners of every other line in one place, those of a diagonal in another. Corners that their own part's homography has elsewhere are
-//! left out. Goes wrong: two boards of which one lies on the other, in line with it.
+//! In: both as places on the board. Out: that there are two boards, or the part to keep. Method: a part's own
+//! homography says where the board's lines are in the whole picture. Corners of the same board lie where these cross,
+//! whatever their numbers are; those of another board lie beyond its sides, or anywhere on it. Squares that are seen so
+//! obliquely that their long sides are several times the short ones are put together wrongly now and then: corners of
+//! every other line in one place, those of a diagonal in another. Corners that their own part's homography has
+//! elsewhere are left out. Goes wrong: two boards of which one lies on the other, in line with it.
 
 use nalgebra::{Matrix3, Point2};
 
@@ -14,7 +16,8 @@ use crate::imaging::Board;
 use crate::imaging::board::Pitch;
 use crate::imaging::lattice::Places;
 
-/// How far from where its lines cross a corner may be seen, in sides of the least square: lenses bend a board's lines by less.
+/// How far from where its lines cross a corner may be seen, in sides of the least square: lenses bend a board's lines
+/// by less.
 const NEAR: f64 = 0.3;
 /// Share of a part's corners that its own homography has where they are, at least, for it to be a board of its own.
 const SOUND: f64 = 0.75;

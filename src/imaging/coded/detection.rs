@@ -1,10 +1,11 @@
 //! Boards whose markers number their corners: found in any part of them.
 //!
-//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its place on the board. Method:
-//! grids of corners grow as on a plain board (`super::detect::growth`), on copies from coarse to fine until the markers are large enough to leave
-//! the corners alone; the markers in a grid's squares say which part of the board it is (`numbering`). Which squares hold the markers (old and new
-//! layout), and whether they are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is
-//! named where the markers tell (`explain`).
+//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its
+//! place on the board. Method: grids of corners grow as on a plain board (`super::detect::growth`), on copies from
+//! coarse to fine until the markers are large enough to leave the corners alone; the markers in a grid's squares say
+//! which part of the board it is (`numbering`). Which squares hold the markers (old and new layout), and whether they
+//! are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is named
+//! where the markers tell (`explain`).
 
 use nalgebra::Point2;
 
@@ -20,7 +21,8 @@ use crate::imaging::image::pyramid::{Level, to_full_size};
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
 
-/// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing more is seen.
+/// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing
+/// more is seen.
 pub const ENOUGH_MARGIN_PX: f64 = 5.0;
 /// Copies with so many pixels may be enlarged.
 const MOST_DOUBLED_PX: usize = 4_000_000;
@@ -205,7 +207,8 @@ fn number(picture: &Picture, board: &Board, fields: &[Fields], grid: &Places) ->
     if corners.count() > 0 { Ok(Part { corners, placement, fields }) } else { Err(Said::Nothing) }
 }
 
-/// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its markers are in the other squares.
+/// True where corners of a grid go on beyond the board on some side, a line of them: it is another board, or its
+/// markers are in the other squares.
 fn goes_beyond(board: &Board, turned: &Places, placement: &Placement) -> bool {
     let (columns, rows) = (board.columns() as isize, board.rows() as isize);
     let (mut beyond, mut lines) = ([0; 4], [0; 4]);
@@ -253,7 +256,8 @@ fn add(board: &Board, parts: &mut Vec<Part>, mut part: Part) -> Result<(), Refus
     Ok(())
 }
 
-/// The corners of all parts; those of the first where several have one. A small grid has too few corners to tell by itself that one of them strays.
+/// The corners of all parts; those of the first where several have one. A small grid has too few corners to tell by
+/// itself that one of them strays.
 fn merged(board: &Board, parts: &[Part]) -> Places {
     let corners = Lattice::from_fn(board.columns(), board.rows(), |col, row| {
         parts.iter().find_map(|part| part.corners.get(col, row).copied())

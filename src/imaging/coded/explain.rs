@@ -1,7 +1,8 @@
 //! What else a board could be whose markers do not number it as the one that was named.
 //!
-//! In: grids of corners without a number. Out: the reason, for a person, and the board that it is, where that is told. Method: the same markers are read once more as on other boards: of another
-//! dictionary, of other counts, with markers of another size, mirrored; the first that they fit is named.
+//! In: grids of corners without a number. Out: the reason, for a person, and the board that it is, where that is told.
+//! Method: the same markers are read once more as on other boards: of another dictionary, of other counts, with markers
+//! of another size, mirrored; the first that they fit is named.
 
 use super::in_grid::markers_in;
 use super::marker::{Fields, TAG_BORDERS, fields};
@@ -20,7 +21,8 @@ const SHARES: [f64; 8] = [0.5, 0.55, 0.6, 0.65, 0.7, 0.75, 0.8, 0.85];
 /// Most columns of a board.
 const MOST_COLUMNS: usize = 40;
 
-/// Why none of these grids is a part of the board, as far as markers of its kind are read in them; `None` where none are.
+/// Why none of these grids is a part of the board, as far as markers of its kind are read in them; `None` where none
+/// are.
 pub fn unnumbered(picture: &Picture, board: &Board, grids: &[Places]) -> Option<Refusal> {
     let dictionary = board.kind.dictionary()?;
     let grid = largest(grids)?;
@@ -78,9 +80,11 @@ fn largest(grids: &[Places]) -> Option<&Places> {
     grids.iter().max_by_key(|grid| grid.count()).filter(|grid| grid.count() >= 4)
 }
 
-/// The dictionary of the markers in the squares of a grid, or of the tags, whatever board was asked for: more of them than chance finds.
+/// The dictionary of the markers in the squares of a grid, or of the tags, whatever board was asked for: more of them
+/// than chance finds.
 pub fn dictionary_in(picture: &Picture, grid: &Places, pitch: Pitch) -> Option<Dictionary> {
-    /// In the squares of a plain board nothing has a marker's outline; of what lies round it one or two may be read as one.
+    /// In the squares of a plain board nothing has a marker's outline; of what lies round it one or two may be read as
+    /// one.
     const FEWEST_UNASKED: usize = 4;
     let known = all_fields(pitch, SHARES.into_iter()).into_iter().flat_map(|fields| {
         let reads = markers_in(picture, grid, pitch, fields);

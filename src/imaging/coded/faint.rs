@@ -1,9 +1,10 @@
 //! Which corner of the board is which, where its markers are too small or too blurred to be read one by one.
 //!
-//! In: how dark the bits are in the squares of a grid. Out: how the grid lies on the board. Method: a matched filter. Where the grid lies right, what the
-//! board has in each square correlates with what is seen there; elsewhere it does by chance only. The sum over all squares is judged by that of all
-//! other turns and shifts of the grid: codes are made to be unlike each other, and blur makes neighbouring bits alike, which widens what chance does there
-//! as it does everywhere. Goes wrong: fewer than a few squares in view, in which no marker can be read.
+//! In: how dark the bits are in the squares of a grid. Out: how the grid lies on the board. Method: a matched filter.
+//! Where the grid lies right, what the board has in each square correlates with what is seen there; elsewhere it does
+//! by chance only. The sum over all squares is judged by that of all other turns and shifts of the grid: codes are made
+//! to be unlike each other, and blur makes neighbouring bits alike, which widens what chance does there as it does
+//! everywhere. Goes wrong: fewer than a few squares in view, in which no marker can be read.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +22,8 @@ pub struct Faint {
     pub darkness: Vec<f64>,
 }
 
-/// How many times what chance does the right place must show: among 10^5 turns and shifts a normal deviate is as large once in 10^8 times.
+/// How many times what chance does the right place must show: among 10^5 turns and shifts a normal deviate is as large
+/// once in 10^8 times.
 const SURE: f64 = 7.5;
 /// The share of that which the second best may reach.
 const RIVAL: f64 = 0.5;
@@ -32,7 +34,8 @@ struct Way {
     quarters: usize,
     shift: (isize, isize),
     layout: Layout,
-    /// The sum of the correlations, in standard deviations of what independent bits would give by chance; negative for white on black.
+    /// The sum of the correlations, in standard deviations of what independent bits would give by chance; negative for
+    /// white on black.
     score: f64,
 }
 
@@ -56,7 +59,8 @@ pub fn place(board: &Board, size: (usize, usize), seen: &[Faint]) -> Said {
     judged(board, size, seen, best)
 }
 
-/// The bits that a board has in a square as a grid shows them that must be turned by so many quarter turns: one for black, from their mean.
+/// The bits that a board has in a square as a grid shows them that must be turned by so many quarter turns: one for
+/// black, from their mean.
 fn expected(board: &Board, layout: Layout, square: (isize, isize), quarters: usize, count: usize) -> Option<Vec<f64>> {
     let side = count.isqrt();
     let code = turned(code_in(board, layout, square)?, side, (4 - quarters % 4) % 4);

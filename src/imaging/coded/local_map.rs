@@ -1,4 +1,5 @@
-//! The map from a board's plane to a picture near one place, from the corners round it: lenses bend a board's lines, but hardly within two squares.
+//! The map from a board's plane to a picture near one place, from the corners round it: lenses bend a board's lines,
+//! but hardly within two squares.
 
 use nalgebra::{Matrix3, Point2, SMatrix, SVector};
 
@@ -9,8 +10,8 @@ use crate::imaging::lattice::Places;
 /// Corners up to so many columns and rows away count.
 const REACH: isize = 2;
 
-/// The homography from the board's plane, in sides of a square from a place of the grid, to the picture: by the corners near it, but for that place itself where
-/// `without_it`. `None` where fewer than four are there, or all on a line.
+/// The homography from the board's plane, in sides of a square from a place of the grid, to the picture: by the corners
+/// near it, but for that place itself where `without_it`. `None` where fewer than four are there, or all on a line.
 fn near(grid: &Places, pitch: Pitch, (col, row): (isize, isize), without_it: bool) -> Option<Matrix3<f64>> {
     let mut points = Vec::new();
     for r in -REACH..=REACH {
@@ -31,8 +32,8 @@ pub fn predicted(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Opt
     place.iter().all(|v| v.is_finite()).then_some(place)
 }
 
-/// The four corners of the square between corner `(col, row)` and the one after it both ways, in order round it; those that the grid lacks as
-/// its neighbours tell.
+/// The four corners of the square between corner `(col, row)` and the one after it both ways, in order round it; those
+/// that the grid lacks as its neighbours tell.
 pub fn square(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Option<[Point2<f64>; 4]> {
     let places = [(0, 0), (1, 0), (1, 1), (0, 1)];
     let known = places.map(|(c, r)| grid.around(col + c, row + r).copied());
@@ -46,8 +47,8 @@ pub fn square(grid: &Places, pitch: Pitch, (col, row): (isize, isize)) -> Option
     filled.iter().flat_map(|p| p.iter()).all(|v| v.is_finite()).then_some(filled)
 }
 
-/// Homography through points `(column, row, place)` by least squares of its linear equations, its last element one at the place that they are
-/// relative to.
+/// Homography through points `(column, row, place)` by least squares of its linear equations, its last element one at
+/// the place that they are relative to.
 pub fn least_squares(points: &[(f64, f64, Point2<f64>)]) -> Option<Matrix3<f64>> {
     if points.len() < 4 {
         return None;

@@ -1,9 +1,10 @@
 //! What stands in one square of a board with markers.
 //!
-//! In: a picture and where the four corners of a square lie in it. Out: the bits of the marker that stands there, or none. Method: each bit is
-//! the mean of nine places in its middle, carried into the picture by the square's homography; black and white are those of the marker's
-//! border and of the paper round it, so that uneven light, and a board printed white on black, do not matter; blur that mixes neighbouring bits is
-//! undone to the second order. Goes wrong: bits of less than about two pixels, and blur of more than one of them.
+//! In: a picture and where the four corners of a square lie in it. Out: the bits of the marker that stands there, or
+//! none. Method: each bit is the mean of nine places in its middle, carried into the picture by the square's
+//! homography; black and white are those of the marker's border and of the paper round it, so that uneven light, and a
+//! board printed white on black, do not matter; blur that mixes neighbouring bits is undone to the second order. Goes
+//! wrong: bits of less than about two pixels, and blur of more than one of them.
 
 use nalgebra::{Matrix3, Point2, Vector3};
 
@@ -14,8 +15,9 @@ use crate::imaging::image::{Grey, Image, Picture};
 /// Widths of a tag's black border, in its bits: Kalibr's, and that of most others who print tags.
 pub const TAG_BORDERS: [usize; 2] = [2, 1];
 
-/// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or blur. By the binomial sum,
-/// fields without any order pass for the border and paper of 4x4 bits once in 4 300 times, of 6x6 in 46 000.
+/// Share of the border's fields, and of those of the paper beside it, that may be on the wrong side: glare, a fold, or
+/// blur. By the binomial sum, fields without any order pass for the border and paper of 4x4 bits once in 4 300 times,
+/// of 6x6 in 46 000.
 const MOST_BROKEN: f64 = 0.25;
 /// Where a bit is looked at, in its own sides from its middle.
 const WITHIN_BIT: [f64; 3] = [-0.2, 0.0, 0.2];
@@ -69,13 +71,15 @@ impl Fields {
         Fields { share: 1.0, bits, border, paper: -gap / 2.0 }
     }
 
-    /// Side of what a square holds beside its own colour, as a share of its side: a marker, or the bits of a tag that fills it.
+    /// Side of what a square holds beside its own colour, as a share of its side: a marker, or the bits of a tag that
+    /// fills it.
     pub fn marked(self) -> f64 {
         let Fields { share, bits, border, .. } = self;
         if share < 1.0 { share } else { bits as f64 / (bits + 2 * border) as f64 }
     }
 
-    /// Where the middle of the paper round a tag or marker is, in sides of its square from that one's edge; negative outside of it.
+    /// Where the middle of the paper round a tag or marker is, in sides of its square from that one's edge; negative
+    /// outside of it.
     pub fn beyond(self) -> f64 {
         self.paper
     }
@@ -86,9 +90,10 @@ impl Fields {
     }
 }
 
-/// The fields of a marker with the blur between them undone as far as four neighbours tell, `paper` round it. To the second order a Gaussian blur of
-/// a standard deviation of `s` fields is undone by `s^2 / 2` of the differences from the neighbours. Fields that are black and white stay
-/// what they are however sharp the picture is, so that one amount does for all.
+/// The fields of a marker with the blur between them undone as far as four neighbours tell, `paper` round it. To the
+/// second order a Gaussian blur of a standard deviation of `s` fields is undone by `s^2 / 2` of the differences from
+/// the neighbours. Fields that are black and white stay what they are however sharp the picture is, so that one amount
+/// does for all.
 fn sharpened(fields: &[f64], side: usize, paper: f64) -> Vec<f64> {
     /// Of a blur of 0.7 fields: beyond it fields mix with more than their neighbours.
     const UNDONE: f64 = 0.25;
@@ -104,7 +109,8 @@ fn sharpened(fields: &[f64], side: usize, paper: f64) -> Vec<f64> {
     (0..side * side).map(one).collect()
 }
 
-/// Where the corners of a unit square lie in a picture, in order round it from (0, 0) over (1, 0): the map from the one to the other.
+/// Where the corners of a unit square lie in a picture, in order round it from (0, 0) over (1, 0): the map from the one
+/// to the other.
 pub fn square_map(corners: &[Point2<f64>; 4]) -> Option<Matrix3<f64>> {
     let [a, b, c, d] = corners;
     // Heckbert 1989, section 2.2.3.
@@ -182,8 +188,8 @@ fn mean_of(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// How dark the bits in a square are, row by row, grey values from their mean, whatever stands round them: for markers that are too faint to be read one
-/// by one. `None` at the picture's border.
+/// How dark the bits in a square are, row by row, grey values from their mean, whatever stands round them: for markers
+/// that are too faint to be read one by one. `None` at the picture's border.
 pub fn darkness(picture: &Picture, corners: &[Point2<f64>; 4], fields: Fields) -> Option<Vec<f64>> {
     let Sampled { fields: greys, side, .. } = sampled(picture, corners, fields)?;
     let Fields { bits, border, .. } = fields;

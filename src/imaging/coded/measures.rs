@@ -1,7 +1,8 @@
 //! What is printed in another size than the board's name says: its markers, or the gaps between its tags.
 //!
-//! In: the corners of a board with their numbers. Out: the reason why it is another board, for a person, and the board with the size that is seen. Goes
-//! wrong: markers too small for their outline to be seen, or nearly as large as their squares, and no two tags side by side: nothing is said.
+//! In: the corners of a board with their numbers. Out: the reason why it is another board, for a person, and the board
+//! with the size that is seen. Goes wrong: markers too small for their outline to be seen, or nearly as large as their
+//! squares, and no two tags side by side: nothing is said.
 
 use nalgebra::Point2;
 
@@ -15,10 +16,11 @@ use crate::statistics::median;
 
 /// How far the marker's size may be from the board's, as a share of a square.
 const MOST_OFF: f64 = 0.05;
-/// How far the gaps between tags may be from the board's, as a share of theirs: printers stretch tags and gaps alike, and what a fisheye bends between two
-/// tags of six is less than half of it.
+/// How far the gaps between tags may be from the board's, as a share of theirs: printers stretch tags and gaps alike,
+/// and what a fisheye bends between two tags of six is less than half of it.
 const MOST_GAP_OFF: f64 = 0.015;
-/// The most by which black spreads on a print, mm, and as a share of the gaps: gaps that are narrower by more are others.
+/// The most by which black spreads on a print, mm, and as a share of the gaps: gaps that are narrower by more are
+/// others.
 const MOST_SPREAD_MM: f64 = 0.3;
 const MOST_SPREAD: f64 = 0.1;
 /// How many standard deviations of the median of all gaps in a picture that must be.
@@ -54,12 +56,14 @@ pub fn other_gaps(board: &Board, corners: &Places) -> Option<Refusal> {
     is_other.then(|| refusal(board, gap * board.square_mm))
 }
 
-/// By how much each side of a tag is printed farther out than it is drawn where a gap is seen so wide, in sides of a tag, mm.
+/// By how much each side of a tag is printed farther out than it is drawn where a gap is seen so wide, in sides of a
+/// tag, mm.
 fn spread_mm(board: &Board, gap_mm: f64, gap: f64) -> f64 {
     (gap_mm - gap * board.square_mm) / (2.0 * (1.0 + gap))
 }
 
-/// How far black has spread on a grid of separate tags, by the corners of several pictures; `None` where no picture shows enough of it.
+/// How far black has spread on a grid of separate tags, by the corners of several pictures; `None` where no picture
+/// shows enough of it.
 fn seen_spread_mm<'a>(board: &Board, pictures: impl Iterator<Item = &'a [Corner]>) -> Option<f64> {
     let Kind::Tags { gap_mm, .. } = board.kind else { return None };
     let of = |corners: &[Corner]| {
@@ -96,7 +100,8 @@ pub fn other_size_mm(asked: &Board, seen: &Board) -> Option<f64> {
     (asked.with_marked_mm(mm) == Some(*seen)).then_some(mm)
 }
 
-/// The size that pictures of the board show together where one of them shows `one_mm` and half of them `middle_mm` or less; `None` where that is another.
+/// The size that pictures of the board show together where one of them shows `one_mm` and half of them `middle_mm` or
+/// less; `None` where that is another.
 pub fn common_mm(board: &Board, one_mm: f64, middle_mm: f64) -> Option<f64> {
     let most_mm = match board.kind {
         Kind::Tags { .. } => MOST_GAP_OFF * middle_mm,
@@ -110,8 +115,9 @@ fn rounded(mm: f64) -> f64 {
     format!("{mm:.2e}").parse().unwrap_or(mm)
 }
 
-/// Width of the gaps between tags as they are seen, in sides of a tag, and its standard deviation: from the cross-ratio of two tags' four corners on a
-/// line, which perspective leaves as it is. `None` where no three neighbouring tags are seen.
+/// Width of the gaps between tags as they are seen, in sides of a tag, and its standard deviation: from the cross-ratio
+/// of two tags' four corners on a line, which perspective leaves as it is. `None` where no three neighbouring tags are
+/// seen.
 fn seen_gap(corners: &Places) -> Option<(f64, f64)> {
     let one = |line: [Option<&Point2<f64>>; 4]| {
         let [Some(a), Some(b), Some(c), Some(d)] = line else { return None };
@@ -131,8 +137,9 @@ fn seen_gap(corners: &Places) -> Option<(f64, f64)> {
     (gaps.len() > 1).then(|| (middle, 1.253 * spread / (gaps.len() as f64).sqrt()))
 }
 
-/// Side of the markers in these squares, each the one after such a corner, as a share of a square: where it is steepest from the paper into their border.
-/// `None` where none of them is seen whole and well enough, and where that is at an end of what is looked at.
+/// Side of the markers in these squares, each the one after such a corner, as a share of a square: where it is steepest
+/// from the paper into their border. `None` where none of them is seen whole and well enough, and where that is at an
+/// end of what is looked at.
 pub fn seen_share(
     picture: &Picture,
     corners: &Places,
@@ -141,13 +148,14 @@ pub fn seen_share(
 ) -> Option<f64> {
     /// Least side of a bit, px.
     const LEAST_FIELD_PX: f64 = 3.0;
-    /// Places from a square's side to its middle, a step apart, in sides of the square: those where markers of 0.95 to 0.3 of it begin have as many on
-    /// either side as the slope is taken over.
+    /// Places from a square's side to its middle, a step apart, in sides of the square: those where markers of 0.95 to
+    /// 0.3 of it begin have as many on either side as the slope is taken over.
     const STEP: f64 = 0.005;
     const FIRST: usize = 5;
     const LAST: usize = 70;
     const BESIDE: usize = 4;
-    /// As steep as the outline is what falls by such a part of the most: of a sharp picture there is no single steepest place.
+    /// As steep as the outline is what falls by such a part of the most: of a sharp picture there is no single steepest
+    /// place.
     const AS_STEEP: f64 = 0.8;
     let field = fields.share / (fields.bits + 2) as f64;
     if corners.step_px()? * field < LEAST_FIELD_PX {

@@ -1,9 +1,10 @@
 //! Which corner of the board is which, by the markers between them.
 //!
-//! In: a grid of corners and the markers that were read in its squares. Out: how the grid lies on the board. Method: every marker that is one of the
-//! board's proposes a turn and a shift of the whole grid; the proposal that most of the markers agree with wins, where it has no rival and hardly a
-//! marker contradicts it. A single marker numbers a grid only where all of its bits are right. Goes wrong: a board that is not the one named; the
-//! markers then say which it could be ([`super::explain`]).
+//! In: a grid of corners and the markers that were read in its squares. Out: how the grid lies on the board. Method:
+//! every marker that is one of the board's proposes a turn and a shift of the whole grid; the proposal that most of the
+//! markers agree with wins, where it has no rival and hardly a marker contradicts it. A single marker numbers a grid
+//! only where all of its bits are right. Goes wrong: a board that is not the one named; the markers then say which it
+//! could be ([`super::explain`]).
 
 use super::marker::Marker;
 use crate::imaging::board::dictionary::turned as quarter_turned;
@@ -40,8 +41,9 @@ pub struct Placement {
 /// How many markers agree for each that contradicts.
 pub const AGREEING: usize = 3;
 
-/// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any order then pass for a
-/// given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a placement needs two that do, or one without a wrong bit.
+/// The number of bits that a marker may be misread in where others agree with it. By the binomial sum, bits without any
+/// order then pass for a given marker once in 480 times for 4x4 bits, in 13 000 for 5x5, in a million for 6x6; a
+/// placement needs two that do, or one without a wrong bit.
 pub fn tolerated(bits: usize) -> usize {
     bits * bits / 8
 }

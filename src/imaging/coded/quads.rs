@@ -1,17 +1,20 @@
 //! Dark shapes of four sides on a light ground: the outlines of tags that nothing dark touches.
 //!
-//! In: a copy of a picture. Out: the four corners of each, to about half a pixel. Method: a pixel is dark where it is below the middle of what is darkest
-//! and lightest round it; dark pixels side by side are a shape; of the convex hull of each the four corners that enclose most are taken, and lines
-//! through its outermost pixels are crossed. Goes wrong: a tag that something dark touches, or that is cut off by the picture's border.
+//! In: a copy of a picture. Out: the four corners of each, to about half a pixel. Method: a pixel is dark where it is
+//! below the middle of what is darkest and lightest round it; dark pixels side by side are a shape; of the convex hull
+//! of each the four corners that enclose most are taken, and lines through its outermost pixels are crossed. Goes
+//! wrong: a tag that something dark touches, or that is cut off by the picture's border.
 
 use nalgebra::{Point2, Vector2};
 
 use crate::geometry::{convex_hull, turn};
 use crate::imaging::image::Grey8;
 
-/// Side of the tiles whose darkest and lightest pixels are looked at, px: with the tiles round it one spans an edge of three of its sides.
+/// Side of the tiles whose darkest and lightest pixels are looked at, px: with the tiles round it one spans an edge of
+/// three of its sides.
 const TILE: usize = 4;
-/// What of the copy's own range a tile's surroundings must span to hold an edge, and how much at the least, grey values.
+/// What of the copy's own range a tile's surroundings must span to hold an edge, and how much at the least, grey
+/// values.
 const LEAST_SPAN: f64 = 0.15;
 const LEAST_GREY: f64 = 10.0;
 /// Least side of a shape, px: fewer hold no bits.
@@ -154,8 +157,8 @@ fn quad(shape: &Shape) -> Option<Quad> {
     ((0..4).all(is_near) && area(&corners) > 0.0).then_some(corners)
 }
 
-/// The corners of a hull that enclose most of it: the one that is farthest from its middle, the one farthest from that, and on either side of both the
-/// one farthest from their line; then each again as far as the others allow.
+/// The corners of a hull that enclose most of it: the one that is farthest from its middle, the one farthest from that,
+/// and on either side of both the one farthest from their line; then each again as far as the others allow.
 fn corners_of(hull: &[Point2<f64>]) -> Option<Quad> {
     let middle = Point2::from(hull.iter().map(|p| p.coords).sum::<Vector2<f64>>() / hull.len() as f64);
     let farthest = |of: &dyn Fn(&Point2<f64>) -> f64| hull.iter().max_by(|a, b| of(a).total_cmp(&of(b))).copied();

@@ -1,9 +1,10 @@
 //! Grids of tags that nothing dark touches, as OpenCV prints them: found in any part of them.
 //!
-//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its place on the board. Method: dark
-//! shapes of four sides (`quads`), on copies from coarse to fine until the tags' bits are large enough; the code of each says which tag it is. Where
-//! each says that the others are is where they must be: a tag that most of those round it do not confirm is none of the board's, or has been moved.
-//! Goes wrong: a single tag, which nothing confirms; tags whose outline is cut off by the picture's border.
+//! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its
+//! place on the board. Method: dark shapes of four sides (`quads`), on copies from coarse to fine until the tags' bits
+//! are large enough; the code of each says which tag it is. Where each says that the others are is where they must be:
+//! a tag that most of those round it do not confirm is none of the board's, or has been moved. Goes wrong: a single
+//! tag, which nothing confirms; tags whose outline is cut off by the picture's border.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,8 +24,8 @@ use crate::imaging::lattice::{Lattice, Places};
 
 /// How far tags tell of each other, in tags.
 const REACH: isize = 2;
-/// By how much the middle of another tag may be off where a tag has it, in sides of a tag a tag and gap away: a tag's own corners are seen to a
-/// fraction of a pixel of its own side.
+/// By how much the middle of another tag may be off where a tag has it, in sides of a tag a tag and gap away: a tag's
+/// own corners are seen to a fraction of a pixel of its own side.
 const OFF: f64 = 0.15;
 /// Most columns of a board.
 const MOST_COLUMNS: usize = 40;
@@ -143,7 +144,8 @@ fn number(marker: Marker, family: Dictionary) -> Option<usize> {
     best.1
 }
 
-/// Of the places beyond a tag's corners, in the middles of where gaps cross, the share that is nearer to its border's grey than to the paper's.
+/// Of the places beyond a tag's corners, in the middles of where gaps cross, the share that is nearer to its border's
+/// grey than to the paper's.
 fn dark_beyond(picture: &Picture, map: &Matrix3<f64>, fields: Fields) -> Option<f64> {
     let beyond = fields.beyond();
     let border = 0.5 * fields.margin();
@@ -205,7 +207,8 @@ impl Order {
         order
     }
 
-    /// Whether two tags are where each has the other; `None` where they are too far apart to tell, on the board and in the picture.
+    /// Whether two tags are where each has the other; `None` where they are too far apart to tell, on the board and in
+    /// the picture.
     fn agree(&self, tag: &Tag, other: &Tag, pitch: f64) -> Option<bool> {
         let ((x, y), (col, row)) = (self.place(tag.number), self.place(other.number));
         let (dx, dy) = (col - x, row - y);

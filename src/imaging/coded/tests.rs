@@ -1,5 +1,5 @@
-//! Boards with markers, rendered: every corner that is found has its own number, lies where it should as surely as it says, and another board is
-//! named.
+//! Boards with markers, rendered: every corner that is found has its own number, lies where it should as surely as it
+//! says, and another board is named.
 
 use nalgebra::{Point2, Vector3};
 
@@ -18,7 +18,8 @@ fn measured(name: &str, picture: &Picture, truth: &[Point2<f64>]) -> (usize, f64
     let (mut count, mut sum) = (0, 0.0);
     for (col, row, corner) in corners.iter() {
         let off = corner.px - truth[board.index(col, row)];
-        // What was seen roughly only is off by less than a tenth of a square, and says so; what was measured by far less.
+        // What was seen roughly only is off by less than a tenth of a square, and says so; what was measured by far
+        // less.
         let limit_px = if corner.covariance_px2.is_some() { 1.0 } else { 7.0 };
         assert!(off.norm() < limit_px, "{name}: corner {col},{row} is off by {off}");
         if let Some(covariance) = corner.covariance_px2 {
@@ -80,7 +81,8 @@ fn parts_cut_by_the_border_are_as_certain_as_they_say() {
     // Of a plain board most has to be seen.
     let plain = [(70.0, 0.0), (-40.0, 45.0)];
     for (board, places) in [(BOARD, &coded[..]), ("checker:9x7:20", &plain[..])] {
-        // Squares of 125, 74 and 52 px, and lenses that bend lines not at all, as the paper's do, and more than a row of squares tells.
+        // Squares of 125, 74 and 52 px, and lenses that bend lines not at all, as the paper's do, and more than a row
+        // of squares tells.
         for (z, bent) in [(250.0, 0.0), (420.0, 1.0), (600.0, -4.0)] {
             let mut all: Vec<f64> = Vec::new();
             for (k, (turn, (x, y))) in turns.iter().flat_map(|turn| places.iter().map(|at| (*turn, at))).enumerate() {
@@ -287,7 +289,8 @@ fn foreshortened_boards_are_measured() {
     let wide = "charuco:9x7:20:15:DICT_4X4_100";
     let tall = "charuco:8x11:24:18.75:DICT_4X4_1000";
     for (board, tilt, spin, z, least, most_chi2) in [
-        // Squares three to four times as wide as high: their markers are nearer to the long edges than a marker of a square seen from above.
+        // Squares three to four times as wide as high: their markers are nearer to the long edges than a marker of a
+        // square seen from above.
         (wide, 1.2, 0.1, 300.0, 40, 3.0),
         (wide, 1.2, 0.5, 400.0, 44, 3.0),
         (wide, 1.25, 0.5, 300.0, 40, 3.0),
@@ -299,7 +302,8 @@ fn foreshortened_boards_are_measured() {
         (tall, 1.2, 0.1, 400.0, 21, f64::INFINITY),
         (tall, 1.2, 0.5, 300.0, 21, f64::INFINITY),
         (wide, 1.25, 0.1, 300.0, 21, f64::INFINITY),
-        // At 72 to 76 degrees parts of the board are put together wrongly: every other line, or a diagonal. They are no second board.
+        // At 72 to 76 degrees parts of the board are put together wrongly: every other line, or a diagonal. They are no
+        // second board.
         (tall, 1.25, 0.0, 250.0, 5, f64::INFINITY),
         (wide, 1.3, 0.5, 250.0, 5, f64::INFINITY),
         (tall, 1.27, 0.1, 400.0, 5, f64::INFINITY),

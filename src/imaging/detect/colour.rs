@@ -29,8 +29,8 @@ pub(super) fn turn_by_colours(small: &Grey8, grid: Places, board: Board) -> Plac
     }
 }
 
-/// True where the squares of the colour of square (0, 0) are the darker ones. Each cell is compared with its neighbours, so
-/// that uneven light does not matter.
+/// True where the squares of the colour of square (0, 0) are the darker ones. Each cell is compared with its
+/// neighbours, so that uneven light does not matter.
 fn first_square_is_dark(small: &Grey8, grid: &Places) -> bool {
     let centre = |col: usize, row: usize| {
         let [a, b, d, c] = grid.square(col, row)?;

@@ -1,10 +1,10 @@
 //! Where does a board end?
 //!
-//! A detector told to look for 9x6 squares may find them inside a board of 10x7. Where one square beyond the grid's border a
-//! whole line of corners looks just like those inside, the board goes on, and which part of it was found is
-//! chance: left and right would not show the same corners. But squares that were cut, with the paper or by it, are not counted by whoever
-//! counts a board's squares: a line of corners beyond which there are only parts of squares, or none, is no line of the board's
-//! if the board has none left for it.
+//! A detector told to look for 9x6 squares may find them inside a board of 10x7. Where one square beyond the grid's
+//! border a whole line of corners looks just like those inside, the board goes on, and which part of it was found is
+//! chance: left and right would not show the same corners. But squares that were cut, with the paper or by it, are not
+//! counted by whoever counts a board's squares: a line of corners beyond which there are only parts of squares, or
+//! none, is no line of the board's if the board has none left for it.
 
 use nalgebra::{Point2, Vector2};
 
@@ -16,9 +16,11 @@ use crate::statistics::median;
 
 /// Share of a line beyond the border that must look like corners; the board's own outer edge shows none.
 const SHARE: f64 = 0.75;
-/// What of a square's contrast a corner beyond the border shows at least. An edge alone shows none, the end of an edge a half.
+/// What of a square's contrast a corner beyond the border shows at least. An edge alone shows none, the end of an edge
+/// a half.
 const CONTRAST: f64 = 0.7;
-/// What of the contrast of most corners one of the grid shows at least: a corner of one square shows none, one in half a shadow a half.
+/// What of the contrast of most corners one of the grid shows at least: a corner of one square shows none, one in half
+/// a shadow a half.
 const END_CONTRAST: f64 = 0.25;
 /// Where the four squares of a corner are looked at, in steps along both edges; where squares are cut, nearer.
 const IN_SQUARES: f64 = 0.4;
@@ -69,8 +71,8 @@ fn beyond(copy: &Grey8, grid: &Places) -> End {
     }
 }
 
-/// The grid without outer lines of which the board, which is smaller, can have none: only parts of squares lie beyond them, or none. `None` where
-/// it is not known which lines those are, or where there are whole squares.
+/// The grid without outer lines of which the board, which is smaller, can have none: only parts of squares lie beyond
+/// them, or none. `None` where it is not known which lines those are, or where there are whole squares.
 pub(super) fn without_cut_lines(copy: &Grey8, grid: &Places, board: Board) -> Option<Places> {
     let (columns, rows) = (board.columns(), board.rows());
     let ways = [(columns, rows), (rows, columns)];
@@ -120,7 +122,8 @@ fn usual(copy: &Grey8, grid: &Places) -> Option<f64> {
     median(grid.iter().filter_map(|(col, row, _)| contrast(copy, grid, (col as isize, row), IN_SQUARES, None)))
 }
 
-/// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a light margin.
+/// The grid without what is no crossing of four squares: at a board's end the outer corners of its dark squares on a
+/// light margin.
 pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
     let at = |col: usize, row: usize, steps: f64| contrast(copy, &grid, (col as isize, row), steps, None);
     let mut seen: Vec<f64> = grid.iter().filter_map(|(col, row, _)| at(col, row, IN_SQUARES)).map(f64::abs).collect();
@@ -134,9 +137,11 @@ pub(super) fn without_ends(copy: &Grey8, grid: Places) -> Places {
     })
 }
 
-/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so many steps along both edges
-/// from it, with the sign that the order of colours gives it: the lesser of both differences between neighbours across an edge and their
-/// neighbours across the other, and none where they have two signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the picture.
+/// Contrast of the four squares round a corner of the grid, or round a place one square before its first column, so
+/// many steps along both edges from it, with the sign that the order of colours gives it: the lesser of both
+/// differences between neighbours across an edge and their neighbours across the other, and none where they have two
+/// signs, as across the board's outer edge. `before`: how many steps against the columns' order. `None` outside of the
+/// picture.
 fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, usize), steps: f64, before: Option<f64>) -> Option<f64> {
     let row = row as isize;
     let (place, along, across) = local(grid, col, row)?;
@@ -153,7 +158,8 @@ fn contrast(copy: &Grey8, grid: &Places, (col, row): (isize, usize), steps: f64,
     Some(if mean > 0.0 { least.max(0.0) } else { most.min(0.0) })
 }
 
-/// A corner of the grid or a place one square before its first column, and the steps to the next column and the next row there.
+/// A corner of the grid or a place one square before its first column, and the steps to the next column and the next
+/// row there.
 fn local(grid: &Places, col: isize, row: isize) -> Option<(Point2<f64>, Vector2<f64>, Vector2<f64>)> {
     let place = if col < 0 { grid.next((0, row), (-1, 0))?.0 } else { *grid.around(col, row)? };
     let col = col.max(0);
@@ -204,7 +210,8 @@ mod tests {
         assert_eq!(kept.count(), 30);
     }
 
-    /// What is left of a board of 9x8 squares of 12 px before a dark wall where its outer squares are cut to a share, with its whole grid of corners.
+    /// What is left of a board of 9x8 squares of 12 px before a dark wall where its outer squares are cut to a share,
+    /// with its whole grid of corners.
     fn cut(share: f64) -> (Grey8, Places) {
         let (left, right) = (24.0 - 12.0 * share, 24.0 + 7.0 * 12.0 + 12.0 * share);
         let bottom = 24.0 + 6.0 * 12.0 + 12.0 * share;
@@ -239,7 +246,8 @@ mod tests {
 
     #[test]
     fn the_edge_of_the_margin_is_no_line_of_corners() {
-        // Squares cut to a half, a light margin, and a dark wall whose edge lies where the next line of corners would be, or near it.
+        // Squares cut to a half, a light margin, and a dark wall whose edge lies where the next line of corners would
+        // be, or near it.
         for margin in [0.2, 0.35, 0.45, 0.5, 0.55, 0.7, 1.0] {
             let (board, grid) = cut(0.5);
             let copy = Grey8::from_fn(board.width, board.height, |x, y| {

@@ -1,7 +1,8 @@
 //! How many squares a plain board has, by a picture that shows all of it.
 //!
-//! In: a picture. Out: the count, where all corners of a grid are there and the board is seen to end on all four sides, or where at least the
-//! next line of corners would be in view. Goes wrong: a board that is cut, hidden or in glare gives none, or too few of the second kind.
+//! In: a picture. Out: the count, where all corners of a grid are there and the board is seen to end on all four sides,
+//! or where at least the next line of corners would be in view. Goes wrong: a board that is cut, hidden or in glare
+//! gives none, or too few of the second kind.
 
 use super::extent;
 use super::plain::{Way, grown, ladder, whole_squares};

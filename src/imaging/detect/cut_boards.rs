@@ -18,8 +18,8 @@ struct Tally {
     refused: usize,
 }
 
-/// How far a measured corner lies at most from where its number says, in steps of the grid, in the best of the numberings that the board's looks
-/// leave open.
+/// How far a measured corner lies at most from where its number says, in steps of the grid, in the best of the
+/// numberings that the board's looks leave open.
 fn farthest(board: &Board, corners: &Lattice<Corner>, truth: &Places) -> f64 {
     let step_px = truth.least_step_px().unwrap();
     let off = |quarters: usize| {
@@ -110,7 +110,8 @@ fn a_finger_over_border_squares_hides_no_line_of_corners() {
         let board: Board = board.parse().unwrap();
         let (columns, rows) = (board.columns(), board.rows());
         let at = |col: usize, row: usize| truth[board.index(col, row)];
-        // In the outer square beside a corner of each border: outwards by half a step, and as long as it takes to hide half of the border's corners.
+        // In the outer square beside a corner of each border: outwards by half a step, and as long as it takes to hide
+        // half of the border's corners.
         let sides = [
             (at(0, rows / 2), at(1, rows / 2), rows),
             (at(columns - 1, rows / 2), at(columns - 2, rows / 2), rows),

@@ -55,8 +55,8 @@ pub struct Open {
     pub refusal: Refusal,
 }
 
-/// The copy on which whole boards with large squares are seen: half as long and wide as that of [`coarse_factor`] and made of a few of the
-/// picture's lines, of a small picture the same.
+/// The copy on which whole boards with large squares are seen: half as long and wide as that of [`coarse_factor`] and
+/// made of a few of the picture's lines, of a small picture the same.
 pub fn glance_level(picture: &Picture) -> Level {
     let first = coarse_factor(picture);
     if first == 1 { Level::Reduced(1) } else { Level::Skimmed(2 * first) }

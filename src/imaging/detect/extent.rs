@@ -1,9 +1,10 @@
 //! Boards that reach beyond the picture's border.
 //!
-//! In: a grid of corners and the board. Out: all ways in which the grid may lie on the board, the lines that are out of view empty. Method: outer
-//! lines with few corners are chance, unless the others are out of view. Missing lines lie on the side where the next line of corners would be out
-//! of view, if the board is seen to end on the other side: a line of squares, then the margin. Something that hides part of the board looks
-//! otherwise; then they may lie on either side. A grid that is as long as the board's shorter side is not known to be the whole of that side.
+//! In: a grid of corners and the board. Out: all ways in which the grid may lie on the board, the lines that are out of
+//! view empty. Method: outer lines with few corners are chance, unless the others are out of view. Missing lines lie on
+//! the side where the next line of corners would be out of view, if the board is seen to end on the other side: a line
+//! of squares, then the margin. Something that hides part of the board looks otherwise; then they may lie on either
+//! side. A grid that is as long as the board's shorter side is not known to be the whole of that side.
 
 use nalgebra::{Point2, Vector2};
 
@@ -14,8 +15,8 @@ use crate::imaging::lattice::{Lattice, Places};
 
 /// A corner nearer to the picture's border is not seen, px of the copy: the ring that is looked at has a radius of 5.
 const CLOSE_PX: f64 = 8.0;
-/// Where the last squares and the margin are looked at, steps beyond the last corners. Something bright that hides a board's squares from some
-/// place on looks like a margin, but hardly begins just where they end.
+/// Where the last squares and the margin are looked at, steps beyond the last corners. Something bright that hides a
+/// board's squares from some place on looks like a margin, but hardly begins just where they end.
 const BEFORE: f64 = -0.5;
 const IN_SQUARE: [f64; 2] = [0.5, 0.85];
 const IN_MARGIN: [f64; 2] = [1.15, 1.3];
@@ -23,7 +24,8 @@ const IN_MARGIN: [f64; 2] = [1.15, 1.3];
 const UNEVEN: f64 = 0.35;
 /// Share of the margin in view that must look as it should.
 const MOST: f64 = 0.8;
-/// Share of the margin that must be in view, and on how many squares at least: on two of them anything may look as it should.
+/// Share of the margin that must be in view, and on how many squares at least: on two of them anything may look as it
+/// should.
 const LEAST_MARGIN: f64 = 0.3;
 const LEAST_SQUARES: usize = 3;
 /// A line with fewer of its corners is a chance find beside the board.
@@ -61,8 +63,8 @@ pub fn placings(small: &Grey8, grid: &Places, board: Board) -> Vec<Places> {
     left.into_iter().flat_map(|left| top.iter().map(move |&top| (left, top))).map(placed).collect()
 }
 
-/// How many of the missing lines may lie before the first one seen, by both ends: none where both ends are the board's, for then there are none
-/// missing, and it is another board or lies otherwise.
+/// How many of the missing lines may lie before the first one seen, by both ends: none where both ends are the board's,
+/// for then there are none missing, and it is another board or lies otherwise.
 fn missing_before(missing: usize, ends: impl Fn() -> [End; 2]) -> Vec<usize> {
     if missing == 0 {
         return vec![0];
@@ -95,8 +97,9 @@ pub fn without_chance_lines(small: &Grey8, mut grid: Places) -> Places {
     }
 }
 
-/// The whole board, where a line beside it has no more than half of its corners: beside a board without a margin on a dark ground every other
-/// square of its border has a corner there, which is none of the board's. Whether the board goes on beyond is seen later.
+/// The whole board, where a line beside it has no more than half of its corners: beside a board without a margin on a
+/// dark ground every other square of its border has a corner there, which is none of the board's. Whether the board
+/// goes on beyond is seen later.
 pub fn whole_without_sparse_line(grid: &Places, board: Board) -> Option<Places> {
     let size = [board.columns(), board.rows()];
     (0..4).map(|quarters| grid.turned(quarters)).filter(|turned| turned.columns > 1).find_map(|turned| {
@@ -107,8 +110,9 @@ pub fn whole_without_sparse_line(grid: &Places, board: Board) -> Option<Places> 
     })
 }
 
-/// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen to end there as a board does.
-/// So it does where a finger lies on the dark squares beyond a line of corners; these are crossings of four squares, and the outline has none.
+/// The grid without outer lines that are no corners but the board's own outline: without such a line the grid is seen
+/// to end there as a board does. So it does where a finger lies on the dark squares beyond a line of corners; these are
+/// crossings of four squares, and the outline has none.
 pub fn without_outline(small: &Grey8, mut grid: Places) -> Places {
     for _ in 0..4 {
         grid = grid.quarter_turn();
@@ -133,7 +137,8 @@ fn are_crossings(small: &Grey8, grid: &Places) -> bool {
 /// Where the next corner of a line would be, and the step that leads there, px.
 type Next = (Point2<f64>, Vector2<f64>);
 
-/// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads there.
+/// Where the corners of the line before a column are, as far as the grid goes on evenly; each with the step that leads
+/// there.
 fn next_places(grid: &Places, column: usize) -> Vec<Option<Next>> {
     (0..grid.rows).map(|row| grid.next((column as isize, row as isize), (-1, 0))).collect()
 }
@@ -213,7 +218,8 @@ mod tests {
     /// Side of a square, px.
     const SIDE: f64 = 10.0;
 
-    /// What is in view of a board whose first inner corner lies at a place, completed; the count of its corners, all at their places.
+    /// What is in view of a board whose first inner corner lies at a place, completed; the count of its corners, all at
+    /// their places.
     fn seen(squares: &str, at: (f64, f64), hidden: impl Fn(f64, f64) -> bool) -> Option<usize> {
         let board = Board::checker(squares.parse().unwrap(), 1.0);
         let (w, h) = (120, 100);

@@ -1,9 +1,10 @@
-//! A board put together corner by corner, where no detector sees the whole of it: partly hidden, cut off, or of another size.
+//! A board put together corner by corner, where no detector sees the whole of it: partly hidden, cut off, or of another
+//! size.
 //!
-//! In: a small grey picture. Out: the largest grid of checkerboard corners in it, whatever its size, with holes where corners are
-//! missing. Method: from a candidate and its nearest neighbours of the opposite colouring the grid grows by
-//! predicting each next place from the steps before it. Between neighbours there must be an edge, bright on the side on which it is
-//! bright at both ends: that keeps clutter out.
+//! In: a small grey picture. Out: the largest grid of checkerboard corners in it, whatever its size, with holes where
+//! corners are missing. Method: from a candidate and its nearest neighbours of the opposite colouring the grid grows by
+//! predicting each next place from the steps before it. Between neighbours there must be an edge, bright on the side on
+//! which it is bright at both ends: that keeps clutter out.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -15,28 +16,30 @@ use crate::imaging::board::Pitch;
 use crate::imaging::image::Grey8;
 use crate::imaging::lattice::{Lattice, Places};
 
-/// Seeds from which a grid is tried, and where one of enough corners is known, altogether and for two tiles: each tile gives its strongest
-/// first, and a grid that is larger still has corners in several of them.
+/// Seeds from which a grid is tried, and where one of enough corners is known, altogether and for two tiles: each tile
+/// gives its strongest first, and a grid that is larger still has corners in several of them.
 const MOST_SEEDS: usize = 600;
 const SEEDS_BESIDE_ENOUGH: usize = 300;
 const SEEDS_FOR_TWO_TILES: usize = 3;
 /// How far from its predicted place a corner may be, in steps of the grid.
 const STRAY: f64 = 0.3;
-/// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far more.
+/// How many times weaker than its neighbour a corner may respond; where squares end at the board's margin it is far
+/// more.
 const WEAKER: i16 = 4;
 /// What of the contrast at its ends an edge shows at least, along each of its halves.
 const EDGE_CONTRAST: f64 = 0.25;
 /// Length of the ways along an edge that are looked at, as a share of it.
 const ALONG: f64 = 0.4;
-/// How far from an edge both squares are looked at, as a share of such a way: where they certainly are, even on an oblique board.
+/// How far from an edge both squares are looked at, as a share of such a way: where they certainly are, even on an
+/// oblique board.
 const ASIDE: f64 = 0.4;
 /// How near to an edge its squares are looked at at least, px: nearer, they blur into each other.
 const NEAREST_PX: f64 = 1.0;
 /// How far the bright axes of neighbours may be from perpendicular, rad.
 const SLANT: f64 = 0.6;
 
-/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3. Once one has `enough` corners, others are looked for
-/// less thoroughly.
+/// The largest grid of corners in the picture; `None` where there is none of at least 3 x 3. Once one has `enough`
+/// corners, others are looked for less thoroughly.
 pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     let candidates = candidates(picture);
     let near = Near::new(picture, &candidates);
@@ -67,9 +70,10 @@ pub fn largest_grid(picture: &Grey8, enough: usize) -> Option<Places> {
     as_grid(&best, &candidates, Pitch::Even).filter(|grid| grid.columns >= 3 && grid.rows >= 3)
 }
 
-/// All grids of four corners and more in a picture of a board with markers, the largest first: parts of a board that something divides. Edges are
-/// looked at within the `margin` round a marker, a share of a square; of `foreshortened` squares nearer to the edge too, as a marker comes near to their
-/// long edges. A grid of tags begins with one both ways and ends with one.
+/// All grids of four corners and more in a picture of a board with markers, the largest first: parts of a board that
+/// something divides. Edges are looked at within the `margin` round a marker, a share of a square; of `foreshortened`
+/// squares nearer to the edge too, as a marker comes near to their long edges. A grid of tags begins with one both ways
+/// and ends with one.
 pub fn grids(picture: &Grey8, pitch: Pitch, margin: f64, foreshortened: bool) -> Vec<Places> {
     /// A square with a marker in it.
     const FEWEST: usize = 4;
@@ -150,8 +154,8 @@ impl<'a> Near<'a> {
         found
     }
 
-    /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both halves of the way
-    /// from one to the other it is bright on the side on which it is bright at the ends.
+    /// True where two candidates are the ends of a square's edge: their colours are those of neighbours, and along both
+    /// halves of the way from one to the other it is bright on the side on which it is bright at the ends.
     fn edge(&self, a: usize, b: usize) -> bool {
         self.ends(a, b) && self.shows_edge(a, b)
     }
@@ -201,8 +205,9 @@ impl<'a> Near<'a> {
         sum
     }
 
-    /// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than `longest`, px. The nearest neighbours
-    /// of a tag's corner are those beyond the gap: lines are numbered so that one before the first begins a tag.
+    /// A grid from one candidate on: places with the candidate there. No neighbour of the first one is farther than
+    /// `longest`, px. The nearest neighbours of a tag's corner are those beyond the gap: lines are numbered so that one
+    /// before the first begins a tag.
     fn grow(&self, pitch: Pitch, first: usize, longest: f64) -> Vec<(Place, usize)> {
         let Some(seed_steps) = self.seed_steps(first, longest) else { return Vec::new() };
         let candidates = self.candidates;
@@ -236,8 +241,8 @@ impl<'a> Near<'a> {
         placed.into_iter().collect()
     }
 
-    /// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of those in
-    /// another direction, no farther than `longest`, px.
+    /// Steps to the neighbours of a corner along its two edges: the nearest of opposite colouring, and the nearest of
+    /// those in another direction, no farther than `longest`, px.
     fn seed_steps(&self, first: usize, longest: f64) -> Option<[Vector2<f64>; 2]> {
         /// Edges nearer to each other than this are no board's, rad.
         const LEAST_ANGLE: f64 = 0.35;
@@ -282,8 +287,8 @@ fn opposite(a: &Candidate, b: &Candidate) -> bool {
 
 type Place = (isize, isize);
 
-/// How long the steps of a grid of at least so many corners are at its start, px. Its squares share the picture, and where some are
-/// larger than their share others are smaller: the grid is found from those.
+/// How long the steps of a grid of at least so many corners are at its start, px. Its squares share the picture, and
+/// where some are larger than their share others are smaller: the grid is found from those.
 fn longest_step(picture: &Grey8, corners: usize) -> f64 {
     /// The longest step that is looked for, px.
     const LONGEST: f64 = 512.0;

@@ -1,4 +1,5 @@
-//! Where the board is in a picture, to about a pixel of a small copy: grids of corners that grow, and what tells which part of the board they are.
+//! Where the board is in a picture, to about a pixel of a small copy: grids of corners that grow, and what tells which
+//! part of the board they are.
 
 mod colour;
 pub mod continuation;

@@ -1,12 +1,13 @@
 //! Where a plain board is, to about a pixel of a small copy.
 //!
-//! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns along
-//! the longer side, turned as far as the colours tell. The copy is an area average of about a million pixels: the board is seen there
-//! as well as on 26 Mpx, in a twentieth of the time. Of large pictures a copy of a quarter of that is tried before, and will do where it
-//! shows all of a board with large squares; a ladder of attempts on finer and coarser copies follows where the first fails. Its work is
-//! bounded by the pixels of the copies, whatever they show: no clock decides what is found, and OpenCV's
-//! classic detector is not among the attempts, because fine texture keeps it busy for minutes (and what it finds is found without
-//! it). Goes wrong: no board, another board, or a board of which too little is in view; each is a reason in words.
+//! In: a picture and the board's size. Out: a reduced copy and a grid of coarse corners on it, right-handed, columns
+//! along the longer side, turned as far as the colours tell. The copy is an area average of about a million pixels: the
+//! board is seen there as well as on 26 Mpx, in a twentieth of the time. Of large pictures a copy of a quarter of that
+//! is tried before, and will do where it shows all of a board with large squares; a ladder of attempts on finer and
+//! coarser copies follows where the first fails. Its work is bounded by the pixels of the copies, whatever they show:
+//! no clock decides what is found, and OpenCV's classic detector is not among the attempts, because fine texture keeps
+//! it busy for minutes (and what it finds is found without it). Goes wrong: no board, another board, or a board of
+//! which too little is in view; each is a reason in words.
 
 use super::colour::{right_handed, turn_by_colours};
 use super::detected::{Detected, LEAST_SEEN, Open, Refusal, glance_level, on_a_copy};
@@ -30,8 +31,8 @@ pub(super) enum Way {
     Grow,
     /// OpenCV's sector-based detector: slower, sees through more blur and noise.
     Sectors,
-    /// Corner by corner where each pixel is as dark as the darkest beside it: in overexposed pictures white bleeds into small dark squares, until
-    /// these no longer touch.
+    /// Corner by corner where each pixel is as dark as the darkest beside it: in overexposed pictures white bleeds into
+    /// small dark squares, until these no longer touch.
     Darkened,
 }
 
@@ -90,7 +91,8 @@ fn detect_plain(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
         };
         if let Some(grid) = found(&small, (level, way), board, &mut search) {
             let complete = grid.count() == board.corner_count();
-            // The whole of a board is not less than what else hangs together in the picture; what was grown ends where the board ends.
+            // The whole of a board is not less than what else hangs together in the picture; what was grown ends where
+            // the board ends.
             let less = |(seen, _): &(Places, Level)| match way {
                 Way::Grow | Way::Darkened => tells(seen) > tells(&grid),
                 Way::Sectors => seen.count() > grid.count(),
@@ -188,7 +190,8 @@ fn holds(grid: &Places, board: Board) -> bool {
     grid.columns.max(grid.rows) >= board.columns() && grid.columns.min(grid.rows) >= board.rows()
 }
 
-/// Attempts in their order. Coarser copies see through blur and noise, finer ones see small boards far away, down to full size.
+/// Attempts in their order. Coarser copies see through blur and noise, finer ones see small boards far away, down to
+/// full size.
 pub(super) fn ladder(picture: &Picture) -> Vec<Attempt> {
     /// Shorter sides than this hold no board that sectors would show, px.
     const LEAST_FOR_SECTORS_PX: usize = 48;
@@ -213,7 +216,8 @@ fn fitting(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
         .or_else(|| of_size(small, &extent::whole_without_sparse_line(grid, board)?, board))
 }
 
-/// A grid as the board's, where it is known which of the board's corners are missing: it can lie on the board in one way only.
+/// A grid as the board's, where it is known which of the board's corners are missing: it can lie on the board in one
+/// way only.
 fn of_size(small: &Grey8, grid: &Places, board: Board) -> Option<Places> {
     /// Share of the board's corners that makes a grid the board.
     const LEAST: f64 = 0.5;

@@ -1,9 +1,10 @@
 //! Places that look like a checkerboard corner: four sectors of alternating brightness, a saddle of the grey values.
 //!
-//! In: a small grey picture. Out: candidates, the local peaks of the ring response of Bennett and Lasenby (ChESS, 2014), each with the axis of
-//! its two bright quadrants. What is a candidate is decided on the spot: by the response against the contrast on the same ring and against
-//! the picture's noise. Nothing elsewhere in the picture, however bright, takes a dim board's corners away. Goes wrong: squares of less than
-//! about 8 px, blur of more than half a square.
+//! In: a small grey picture. Out: candidates, the local peaks of the ring response of Bennett and Lasenby (ChESS,
+//! 2014), each with the axis of its two bright quadrants. What is a candidate is decided on the spot: by the response
+//! against the contrast on the same ring and against the picture's noise. Nothing elsewhere in the picture, however
+//! bright, takes a dim board's corners away. Goes wrong: squares of less than about 8 px, blur of more than half a
+//! square.
 
 use nalgebra::{Point2, Vector2};
 
@@ -31,13 +32,15 @@ const RING: [(isize, isize); 16] = [
 ];
 /// The ring's reach, px.
 const REACH: usize = 5;
-/// Least response of a corner over the contrast on its ring; a saddle has 20 to 30, the outer corner of a board's square hardly any.
+/// Least response of a corner over the contrast on its ring; a saddle has 20 to 30, the outer corner of a board's
+/// square hardly any.
 const LEAST_SHAPE: f64 = 8.0;
 /// Least contrast on a ring, in standard deviations of the picture's noise.
 const LEAST_CONTRAST: f64 = 3.0;
 /// Least noise that is reckoned with, grey values: that of rounding.
 const LEAST_NOISE: f64 = 0.5;
-/// Tiles along the longer side of a picture. Each keeps as many candidates as it can hold corners of a board with the smallest squares.
+/// Tiles along the longer side of a picture. Each keeps as many candidates as it can hold corners of a board with the
+/// smallest squares.
 const TILES: usize = 16;
 /// Responses that are looked at together: most of a picture is far from any corner.
 const RUN: usize = 32;
@@ -68,7 +71,8 @@ pub(super) fn tiles(picture: &Grey8) -> usize {
     columns * rows
 }
 
-/// All candidates: first the strongest of each tile, then each tile's second, and so on, so that every part of the picture is soon looked at.
+/// All candidates: first the strongest of each tile, then each tile's second, and so on, so that every part of the
+/// picture is soon looked at.
 pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     let (w, h) = (picture.width, picture.height);
     if w <= 2 * REACH || h <= 2 * REACH {
@@ -105,8 +109,8 @@ pub(super) fn candidates(picture: &Grey8) -> Vec<Candidate> {
     ranked.into_iter().map(|(_, candidate)| candidate).collect()
 }
 
-/// Standard deviation of the noise, grey values: from what neighbours differ by in three places of four. Half of a picture may be clipped and
-/// without noise, a quarter may be edges.
+/// Standard deviation of the noise, grey values: from what neighbours differ by in three places of four. Half of a
+/// picture may be clipped and without noise, a quarter may be edges.
 fn noise(picture: &Grey8) -> f64 {
     /// About this many places are looked at.
     const LOOKED_AT: usize = 50_000;
@@ -127,8 +131,9 @@ fn noise(picture: &Grey8) -> f64 {
     third_quartile.map_or(LEAST_NOISE, |difference| (difference as f64 / THIRD_QUARTILE).max(LEAST_NOISE))
 }
 
-/// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a quarter turn on the
-/// other colour, less what a line or an edge shows, less what a spot shows. `REACH` px at the border have none.
+/// Five times the ring response of every pixel, a whole number that fits: opposite pixels of the ring alike and a
+/// quarter turn on the other colour, less what a line or an edge shows, less what a spot shows. `REACH` px at the
+/// border have none.
 fn responses(picture: &Grey8) -> Vec<i16> {
     widest(
         #[inline(always)]
@@ -198,7 +203,8 @@ fn on_ring(picture: &Grey8, (x, y): (usize, usize), (dx, dy): (isize, isize)) ->
 /// Mean of the brighter half of the ring round a place less that of the darker half.
 fn contrast(picture: &Grey8, x: usize, y: usize) -> f64 {
     let ring = RING.map(|offset| on_ring(picture, (x, y), offset));
-    // Where half of the values lie on either side of a level, their distances from it add up to the one less the other, and to more elsewhere.
+    // Where half of the values lie on either side of a level, their distances from it add up to the one less the other,
+    // and to more elsewhere.
     let distances = |level: u8| ring.iter().map(|grey| u16::from(grey.abs_diff(level))).sum::<u16>();
     f64::from(ring.map(distances).into_iter().fold(u16::MAX, u16::min)) / (ring.len() / 2) as f64
 }

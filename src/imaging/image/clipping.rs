@@ -1,11 +1,12 @@
 //! From which grey value on a pixel tells only "too bright", and pictures that know it.
 //!
-//! In: grey values. Out: the clip level; values at or above it are left out of every fit. It is the end of the range that the values
-//! use (8, 10, 12, 14 or 16 bits, also where a camera shifts its bits to the top), or a level below it at which the histogram
-//! ends in a pile: a camera that clips at 4080 of 65535, or a converter that ends early. A pile is many pixels of the same value with
-//! hardly any above, while the values below are thinly spread, in a picture that has noise elsewhere: white without any noise beside
-//! dark with noise is clipped, for light has the more noise the brighter it is. A drawn picture without noise is not clipped.
-//! Goes wrong: values that were changed after clipping (flat-field correction) have no common level.
+//! In: grey values. Out: the clip level; values at or above it are left out of every fit. It is the end of the range
+//! that the values use (8, 10, 12, 14 or 16 bits, also where a camera shifts its bits to the top), or a level below it
+//! at which the histogram ends in a pile: a camera that clips at 4080 of 65535, or a converter that ends early. A pile
+//! is many pixels of the same value with hardly any above, while the values below are thinly spread, in a picture that
+//! has noise elsewhere: white without any noise beside dark with noise is clipped, for light has the more noise the
+//! brighter it is. A drawn picture without noise is not clipped. Goes wrong: values that were changed after clipping
+//! (flat-field correction) have no common level.
 
 use super::grey::{Grey, Image};
 
@@ -140,7 +141,8 @@ fn is_noisy(counts: &[u32]) -> bool {
 mod tests {
     use super::*;
 
-    /// Light and dark squares with noise of `sigma` (from sums of congruential numbers), white at `white`, through a camera that clips.
+    /// Light and dark squares with noise of `sigma` (from sums of congruential numbers), white at `white`, through a
+    /// camera that clips.
     fn noisy(white: f64, sigma: f64, clip: f64) -> Vec<f64> {
         let mut state = 1u64;
         let mut uniform = move || {

@@ -10,8 +10,8 @@ use super::clipping::{self, Value};
 use super::limits::{self, undecodable};
 use super::{Claim, Image, Mosaic, Picture, UNDECODABLE, integrity, mosaic};
 
-/// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps to tell the
-/// format. A grey picture that is a raw colour mosaic needs its pattern.
+/// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps
+/// to tell the format. A grey picture that is a raw colour mosaic needs its pattern.
 pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
     let decoded = decoded(bytes, path)?;
     let size = (decoded.width() as usize, decoded.height() as usize);
@@ -33,9 +33,10 @@ const LUMA: [u64; 3] = [19_595, 38_470, 7_471];
 
 /// One grey from three colours: of samples of `channels` values a pixel, red, green and blue first.
 ///
-/// Weights are those of ITU-R BT.601, so that grey stored as colour is the same grey. A pixel at which any colour is clipped counts as clipped: a
-/// clipped colour bends an edge's profile and stays unseen in the sum. Weights are the same in all pictures, also where a colour is clipped
-/// throughout: lenses show each colour at a place of its own, tenths of a pixel apart, and a rig is made of places that are alike in all pictures.
+/// Weights are those of ITU-R BT.601, so that grey stored as colour is the same grey. A pixel at which any colour is
+/// clipped counts as clipped: a clipped colour bends an edge's profile and stays unseen in the sum. Weights are the
+/// same in all pictures, also where a colour is clipped throughout: lenses show each colour at a place of its own,
+/// tenths of a pixel apart, and a rig is made of places that are alike in all pictures.
 fn of_colours<T: Value>(samples: &[T], channels: usize, (width, height): (usize, usize)) -> Image<T> {
     let levels = [0, 1, 2].map(|colour| clipping::channel_level(samples, channels, colour) as u64);
     let pixels = samples

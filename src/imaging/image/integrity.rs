@@ -1,7 +1,8 @@
 //! Is a file whole? Decoders fill in what is missing, and a filled-in picture would be measured.
 //!
-//! What a format can tell: PNG has a checksum for each chunk and an end chunk; a JPEG an end marker, and codes that damage breaks
-//! ([`jpeg_scan`]); TIFF, BMP and PGM say how many bytes there must be (their decoders say so), and cannot tell a changed byte.
+//! What a format can tell: PNG has a checksum for each chunk and an end chunk; a JPEG an end marker, and codes that
+//! damage breaks ([`jpeg_scan`]); TIFF, BMP and PGM say how many bytes there must be (their decoders say so), and
+//! cannot tell a changed byte.
 
 use image::ImageFormat;
 

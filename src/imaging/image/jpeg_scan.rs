@@ -1,9 +1,10 @@
-//! Walks through the entropy-coded data of a JPEG without making a picture of it: are there as many blocks as the header announces?
+//! Walks through the entropy-coded data of a JPEG without making a picture of it: are there as many blocks as the
+//! header announces?
 //!
-//! A decoder fills in what is missing and goes on after damage. But codes are of unequal length, so that a changed or lost byte shifts all
-//! that follows: there is then no code, too little data, or some left over. In: a file whose first segments are in order. Out: nothing, or
-//! what is wrong. Method: ITU-T T.81, annex F. Baseline and extended sequential pictures with Huffman codes; a progressive one is left
-//! to its decoder.
+//! A decoder fills in what is missing and goes on after damage. But codes are of unequal length, so that a changed or
+//! lost byte shifts all that follows: there is then no code, too little data, or some left over. In: a file whose first
+//! segments are in order. Out: nothing, or what is wrong. Method: ITU-T T.81, annex F. Baseline and extended sequential
+//! pictures with Huffman codes; a progressive one is left to its decoder.
 
 /// Symbol and length of the code that a word of 16 bits begins with; length 0 where there is none.
 type Codes = Vec<(u8, u8)>;

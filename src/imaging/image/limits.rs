@@ -1,7 +1,7 @@
 //! What is looked at before a file is decoded: what kind of file it is, how large, and what its header announces.
 //!
-//! A header of a few bytes can announce any number of pixels, and a name can lead to a pipe that never ends. Nothing is read or
-//! allocated before it is known to be bounded; all workers together hold no more than a fixed number of bytes.
+//! A header of a few bytes can announce any number of pixels, and a name can lead to a pipe that never ends. Nothing is
+//! read or allocated before it is known to be bounded; all workers together hold no more than a fixed number of bytes.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Seek};
@@ -71,8 +71,8 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
     Ok(Header { pages, width, height, file_bytes, decoded_bytes: decoder.total_bytes() })
 }
 
-/// The pictures of a TIFF, as far as they can be followed, but for smaller copies; at least one. The first is read, and whoever saved a series in one
-/// file has to know that.
+/// The pictures of a TIFF, as far as they can be followed, but for smaller copies; at least one. The first is read, and
+/// whoever saved a series in one file has to know that.
 fn pages(path: &Utf8Path) -> usize {
     let decoder = File::open(path).ok().and_then(|file| Decoder::new(BufReader::new(file)).ok());
     let Some(mut decoder) = decoder else { return 1 };

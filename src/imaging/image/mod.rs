@@ -1,8 +1,8 @@
 //! Pictures as measured: one decoder, one grey.
 //!
-//! In: a file (PNG, TIFF, BMP, JPEG, PGM; 8 or 16 bit; grey, colour, or a raw mosaic whose pattern is named). Out: grey values as
-//! they were measured, 8 or 16 bit, and the level at which they are clipped. Nothing is scaled, turned or corrected: two
-//! decoders, or one that "improves", would give two measurements.
+//! In: a file (PNG, TIFF, BMP, JPEG, PGM; 8 or 16 bit; grey, colour, or a raw mosaic whose pattern is named). Out: grey
+//! values as they were measured, 8 or 16 bit, and the level at which they are clipped. Nothing is scaled, turned or
+//! corrected: two decoders, or one that "improves", would give two measurements.
 
 mod clipping;
 mod decode;

@@ -1,10 +1,11 @@
 //! Raw colour mosaics (Bayer 1976): each pixel behind a red, green or blue filter.
 //!
-//! A raw mosaic looks like a grey picture with a pattern of period two, and measured as one it gives corners of which nobody knows the
-//! error. So it is recognised (in even light the four pixels of a cell differ alike all over the picture) and refused with the patterns
-//! that it may have; with its pattern named it is read, and without where the filters hardly differ. A board is black and white: behind each filter its grey is a linear function of
-//! the green one. The two are matched, over bright and over dark areas, and every pixel stays a measurement of its own,
-//! with its own noise; interpolated colours would be neither. Goes wrong: a lens that images red and blue in other places than
+//! A raw mosaic looks like a grey picture with a pattern of period two, and measured as one it gives corners of which
+//! nobody knows the error. So it is recognised (in even light the four pixels of a cell differ alike all over the
+//! picture) and refused with the patterns that it may have; with its pattern named it is read, and without where the
+//! filters hardly differ. A board is black and white: behind each filter its grey is a linear function of the green
+//! one. The two are matched, over bright and over dark areas, and every pixel stays a measurement of its own, with its
+//! own noise; interpolated colours would be neither. Goes wrong: a lens that images red and blue in other places than
 //! green widens the edges a little; a white balance that makes all filters alike leaves no pattern and no harm.
 
 use std::fmt;
@@ -71,11 +72,12 @@ const CELLS: usize = 30_000;
 const RUN: usize = 64;
 /// Cells that differ from the next one by less than this share are flat.
 const FLAT: f64 = 0.06;
-/// Share by which pixels of a cell differ from their mean in a mosaic, at the least. Unequal rows of a sensor with several amplifiers
-/// differ by a percent or two.
+/// Share by which pixels of a cell differ from their mean in a mosaic, at the least. Unequal rows of a sensor with
+/// several amplifiers differ by a percent or two.
 const COLOURED: f64 = 0.04;
-/// Share up to which the filters are told apart by the picture alone: under infrared light, or where the camera has matched them but for a little,
-/// all see nearly the same. Red and blue filters under a light that one sees by differ from green by several times this.
+/// Share up to which the filters are told apart by the picture alone: under infrared light, or where the camera has
+/// matched them but for a little, all see nearly the same. Red and blue filters under a light that one sees by differ
+/// from green by several times this.
 const NEARLY_ALIKE: f64 = 0.1;
 /// Share by which the two greens may differ.
 const GREENS_ALIKE: f64 = 0.03;
@@ -101,7 +103,8 @@ fn without_alpha<T: Copy>(samples: &[T]) -> Vec<T> {
     samples.chunks_exact(2).map(|p| p[0]).collect()
 }
 
-/// The picture, read by its pattern where one is named; a reason where it is a mosaic without one, or not of the one named.
+/// The picture, read by its pattern where one is named; a reason where it is a mosaic without one, or not of the one
+/// named.
 pub(super) fn grey<T: Value>(image: Image<T>, pattern: Option<Mosaic>) -> Result<Picture, String>
 where
     Picture: From<Image<T>>,
@@ -175,7 +178,8 @@ fn pattern_of(cells: &[[f64; 4]]) -> Option<([usize; 2], f64)> {
     (differ(greens) < GREENS_ALIKE && most > COLOURED).then_some((greens, most))
 }
 
-/// Each filter's values as the first green's, by a line through the medians of dark and bright cells; 16 bits, so that nothing is rounded away.
+/// Each filter's values as the first green's, by a line through the medians of dark and bright cells; 16 bits, so that
+/// nothing is rounded away.
 fn matched<T: Value>(image: &Image<T>, cells: &[[f64; 4]], pattern: Mosaic) -> Image<u16> {
     let scale = f64::from(u16::MAX) / T::TOP.whole() as f64;
     let green = pattern.greens()[0];

@@ -1,8 +1,9 @@
 //! Copies of a picture at other sizes, and where their pixels lie.
 //!
-//! In: a picture. Out: an 8-bit copy for looking, each of its pixels the mean of a block of the picture's, or twice as large. How a
-//! place on a copy becomes one in the picture and back is said here and nowhere else. 16-bit values are stretched over the range that
-//! all but a few in a thousand use, so that a hot pixel or a lamp does not flatten the board.
+//! In: a picture. Out: an 8-bit copy for looking, each of its pixels the mean of a block of the picture's, or twice as
+//! large. How a place on a copy becomes one in the picture and back is said here and nowhere else. 16-bit values are
+//! stretched over the range that all but a few in a thousand use, so that a hot pixel or a lamp does not flatten the
+//! board.
 
 use std::ops::AddAssign;
 
@@ -93,7 +94,8 @@ pub fn to_full_size(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
     std::iter::successors(Some(coarse_factor(picture)), halved).map(Level::Reduced)
 }
 
-/// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a block that count.
+/// A copy reduced by a whole factor; what is left over at the right and lower border is dropped. `lines` are those of a
+/// block that count.
 fn reduced(picture: &Picture, factor: usize, lines: &dyn Fn(usize) -> Vec<usize>) -> Grey8 {
     let factor = factor.clamp(1, picture.width().min(picture.height()).clamp(1, MOST_REDUCED));
     let lines = lines(factor);
@@ -125,11 +127,12 @@ const MOST_REDUCED: usize = 256;
 /// Bits of a reciprocal in whole numbers: 255 n / n times 2^23 fits into 31 bits.
 const SHIFT: u32 = 23;
 
-/// Pixels up to which a mean by a reciprocal in whole numbers is rounded as the mean itself: 255 n / 2^23 is less than 1 / n up to here.
+/// Pixels up to which a mean by a reciprocal in whole numbers is rounded as the mean itself: 255 n / 2^23 is less than
+/// 1 / n up to here.
 const MOST_BY_WHOLE: usize = 181;
 
-/// Means of the `lines` of blocks of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as a type that holds
-/// the sum of a column.
+/// Means of the `lines` of blocks of `factor` x `factor` pixels, `low..high` stretched to 0..255. `value` is a pixel as
+/// a type that holds the sum of a column.
 fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     image: &Image<T>,
     factor: usize,
@@ -144,7 +147,8 @@ fn means<T: Copy, S: Copy + Default + AddAssign + Into<u32>>(
     let scale = 255.0 / (high - low).max(1.0);
     let count = lines.len() * factor;
     let unit = scale / count as f64;
-    // The same numbers in whole ones where nothing is stretched: the rounding upwards of the reciprocal is too little to reach the next half.
+    // The same numbers in whole ones where nothing is stretched: the rounding upwards of the reciprocal is too little
+    // to reach the next half.
     let by_whole =
         (low == 0.0 && high == 255.0 && count <= MOST_BY_WHOLE).then(|| (1u32 << SHIFT).div_ceil(count as u32));
     let rows = image.pixels.chunks(factor * image.width.max(1));

@@ -25,8 +25,9 @@ pub enum Samples {
 }
 
 impl Raster {
-    /// Reads a picture whose header was looked at and whose bytes were [claimed](super::Claim); the reason where that is not possible.
-    /// Transparency is left away; a raw colour mosaic becomes the grey that [`super::decode()`] makes of it.
+    /// Reads a picture whose header was looked at and whose bytes were [claimed](super::Claim); the reason where that
+    /// is not possible. Transparency is left away; a raw colour mosaic becomes the grey that [`super::decode()`] makes
+    /// of it.
     pub fn read(path: &Utf8Path, header: &Header, pattern: Option<Mosaic>) -> Result<Raster, String> {
         Raster::decode(&read(path, header)?, path, pattern)
     }

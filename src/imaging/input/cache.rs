@@ -1,9 +1,9 @@
 //! Corners of pictures that were measured before, by what is in the picture, and thumbnails of them.
 //!
-//! In: the hash of a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the bit, if it is the same
-//! algorithm's. The name of an entry is a hash of all that the result depends on, so a changed picture, board or program makes a new
-//! entry; its first line is a hash of the rest, so a changed entry is none. An entry that can't be read is as good as none,
-//! and one that can't be written costs only time.
+//! In: the hash of a picture file's bytes, the board, and how the file is read. Out: what a former run found, to the
+//! bit, if it is the same algorithm's. The name of an entry is a hash of all that the result depends on, so a changed
+//! picture, board or program makes a new entry; its first line is a hash of the rest, so a changed entry is none. An
+//! entry that can't be read is as good as none, and one that can't be written costs only time.
 
 use nalgebra::{Matrix2, Point2};
 use xxhash_rust::xxh3::{Xxh3Default, xxh3_128};
@@ -16,8 +16,8 @@ use crate::imaging::image::pyramid::{Level, Small};
 use crate::imaging::lattice::{Lattice, Renumbering};
 use crate::imaging::{Board, Corner, Mosaic};
 
-/// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a corner fails the test
-/// `the_algorithm_is_named_by_what_it_finds`, which says the new name.
+/// Names the algorithm by what it finds: a hash of the corners of the golden pictures below. A change that moves a
+/// corner fails the test `the_algorithm_is_named_by_what_it_finds`, which says the new name.
 const ALGORITHM: &str = "corners 88102351d80d26ca";
 
 /// A board in a picture.
@@ -106,8 +106,8 @@ type Kept = (usize, usize, [f64; 2], Option<[f64; 3]>, Option<f64>, Option<[f64;
 /// The board that a picture shows instead, and why that is no use.
 type Refused = (Option<String>, String);
 
-/// What an entry holds of a sighting: the corners; of the markers their share of a square, whether they are in the old layout, or in OpenCV's
-/// of tags, and whether they are inverted; and the numbers that are open.
+/// What an entry holds of a sighting: the corners; of the markers their share of a square, whether they are in the old
+/// layout, or in OpenCV's of tags, and whether they are inverted; and the numbers that are open.
 type Seen = (Vec<Kept>, Option<(f64, bool, bool)>, Option<(Vec<Renumbering>, Refused)>);
 
 /// The entry: a checksum of the rest, the algorithm, and what it found.
@@ -163,7 +163,8 @@ fn parse(text: &str, board: Board) -> Option<Look> {
     Some(Ok(Sighting { corners, print, open }))
 }
 
-/// The other board that a picture shows. An entry is for boards of all lengths of one ratio: they are those of the board that is looked for.
+/// The other board that a picture shows. An entry is for boards of all lengths of one ratio: they are those of the
+/// board that is looked for.
 fn parse_seen(seen: Option<String>, board: Board) -> Option<Option<Board>> {
     let Some(seen) = seen else { return Some(None) };
     let seen: Board = seen.parse().ok()?;
@@ -330,8 +331,8 @@ mod tests {
         let coded = coded.map(|(name, turn, aside, away)| {
             (Shot::of(name, turn, [aside, 0.0, away]).taken().0, name.parse().unwrap())
         });
-        // Full size, reduced by two, the same with bent edges, squares that are seen on a finer copy only, 16 bits, and what is above, in colours
-        // of which one is clipped.
+        // Full size, reduced by two, the same with bent edges, squares that are seen on a finer copy only, 16 bits, and
+        // what is above, in colours of which one is clipped.
         let plain = eights.into_iter().chain([sixteen, clipped, glary, cut(160, 0), cut(160, 140), coloured()]);
         for (picture, board) in plain.map(|picture| (picture, board)).chain(coded) {
             let detected = detect::detect(&picture, board).unwrap();

@@ -1,9 +1,10 @@
 //! `corners.csv`: corners of all pairs as text, from this program or from any other detector.
 //!
 //! In: a CSV file with the columns `pair,side,col,row,x_px,y_px` and optionally
-//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order; where the board has markers `id` may stand for `col`
-//! and `row`. Out: [`Corners`], and back. Raw (distorted) pixels, pixel (0, 0) is the centre of the top-left pixel. Width and height
-//! are those of the picture, one size for each side; a file without them needs them said.
+//! `sxx_px2,sxy_px2,syy_px2,used,blur_px,width_px,height_px`, rows in any order; where the board has markers `id` may
+//! stand for `col` and `row`. Out: [`Corners`], and back. Raw (distorted) pixels, pixel (0, 0) is the centre of the
+//! top-left pixel. Width and height are those of the picture, one size for each side; a file without them needs them
+//! said.
 
 mod line;
 
@@ -53,9 +54,9 @@ const UNUSED_ID: &str = "the corners file has a column `id`, as of a board with 
 
 /// Reads `corners.csv`. `size` is the width and height of the pictures, px, for a file that does not hold them.
 ///
-/// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board or in the
-/// picture, a size that differs from that of the side's other pictures or from `size`.
-/// A file whose columns run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped, but for boards whose
+/// Refused with the line: bad numbers, an unknown side, a corner that stands there twice or does not exist on the board
+/// or in the picture, a size that differs from that of the side's other pictures or from `size`. A file whose columns
+/// run along the shorter side is turned by 90 degrees. Pairs seen by one camera only are skipped, but for boards whose
 /// corners have numbers of their own.
 pub fn read(path: &Utf8Path, board: Board, size: Option<(u32, u32)>) -> Result<Corners> {
     let hint = "`stereocal camera-check IMAGES` writes corners.csv beside its report";
@@ -132,7 +133,8 @@ fn parse(table: &Table, board: Board) -> Result<Vec<Row>> {
     Ok(rows)
 }
 
-/// Checks that every corner exists on the board; true where the file's columns ran along the shorter side and were turned.
+/// Checks that every corner exists on the board; true where the file's columns ran along the shorter side and were
+/// turned.
 fn fit_to_board(table: &Table, rows: &mut [Row], board: Board) -> Result<bool> {
     let (columns, lines) = (board.columns(), board.rows());
     if rows.iter().all(|r| r.corner.col < columns && r.corner.row < lines) {

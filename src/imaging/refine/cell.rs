@@ -40,7 +40,8 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// The cell of a corner; `None` where it has no neighbour along one of its edges, or squares too small or too oblique to hold an edge.
+    /// The cell of a corner; `None` where it has no neighbour along one of its edges, or squares too small or too
+    /// oblique to hold an edge.
     pub(super) fn of(places: &Places, col: usize, row: usize) -> Option<Cell> {
         /// Least height of a square over its side, px.
         const LEAST_HEIGHT_PX: f64 = 2.0;
@@ -94,7 +95,8 @@ impl Cell {
         Cell { edges, share, marked, square: side, dark, ..self }
     }
 
-    /// The edges, no longer than a gap is wide where the tag beyond the gap is not seen: what is there instead nobody knows.
+    /// The edges, no longer than a gap is wide where the tag beyond the gap is not seen: what is there instead nobody
+    /// knows.
     fn within_gaps(&self, places: &Places, pitch: Pitch, [col, row]: [usize; 2]) -> [Vector2<f64>; 2] {
         let [x, y] = Board::outwards(col, row).map(|out| out as isize);
         let (c, r) = (col as isize, row as isize);
@@ -102,8 +104,8 @@ impl Cell {
         [0, 1].map(|k| if is_seen[k] { self.edges[k] } else { self.edges[k] * pitch.least() })
     }
 
-    /// Over how much of bend times the half of a window squared a straight edge is off at the corner: through it by a sixth, where it ends there by a
-    /// twelfth the other way.
+    /// Over how much of bend times the half of a window squared a straight edge is off at the corner: through it by a
+    /// sixth, where it ends there by a twelfth the other way.
     pub(super) fn straight(&self) -> f64 {
         if self.dark.is_some() { -12.0 } else { 6.0 }
     }
@@ -122,8 +124,9 @@ impl Cell {
         ((1.0 - self.share) / 2.0).min(1.0 / self.square) * self.square_height_px()
     }
 
-    /// The least height of the squares with markers over the edges that meet at the corner, px. At the border of a grid of tags an edge is as
-    /// long as a tag one way and as a gap the other, and what is short in the picture may be either.
+    /// The least height of the squares with markers over the edges that meet at the corner, px. At the border of a grid
+    /// of tags an edge is as long as a tag one way and as a gap the other, and what is short in the picture may be
+    /// either.
     fn square_height_px(&self) -> f64 {
         // Of a checkerboard every edge is a square's.
         if self.square <= 1.0 {
@@ -137,21 +140,23 @@ impl Cell {
         self.marked.iter().flatten().map(height).fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a first fit, whose window leaves out what a sharp picture shows of the markers, is more than a start. Two markers that lie opposite each
-    /// other pull a corner hardly; a tag has none opposite, and the next corner is but a gap away. Beside a single dark quadrant the bits of its tag are as near
-    /// as its border is wide: such a fit is a start and no more.
+    /// Whether a first fit, whose window leaves out what a sharp picture shows of the markers, is more than a start.
+    /// Two markers that lie opposite each other pull a corner hardly; a tag has none opposite, and the next corner is
+    /// but a gap away. Beside a single dark quadrant the bits of its tag are as near as its border is wide: such a fit
+    /// is a start and no more.
     pub(super) fn stands_alone(&self, blur_px: f64) -> bool {
         self.square <= 1.0 || self.dark.is_none() && self.hidden(blur_px).is_some()
     }
 
-    /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by themselves.
+    /// What a window of such a blur leaves out; `None` where markers stand too near for the edges to be seen by
+    /// themselves.
     pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
         let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);
         is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + self.beside_px()))
     }
 
-    /// How far from where it should be what is beside the corner may be printed, px. A tag's bits are printed with its edges, and its border is so narrow
-    /// that a px of it is most of what a window leaves.
+    /// How far from where it should be what is beside the corner may be printed, px. A tag's bits are printed with its
+    /// edges, and its border is so narrow that a px of it is most of what a window leaves.
     pub(super) fn beside_px(&self) -> f64 {
         if self.dark.is_some() { 0.0 } else { HALO_PX }
     }

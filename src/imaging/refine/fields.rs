@@ -1,11 +1,12 @@
 //! Were all rows of a picture taken at one moment? Interlaced video takes the even rows first, then the odd ones.
 //!
-//! In: a picture and where its corners are. Out: how far its two fields lie apart where the board moved between them; corners measured in
-//! such a picture are those of two boards. Method: at each edge a row is compared with the mean of the rows above and below; what
-//! they differ by, over the grey value's slope along the row, is a shift. Between fields it alternates from row to row. The
-//! same sums with a sign that alternates every two rows hold noise, slanted edges and blur just as well, and no fields. Colours that were
-//! interpolated from a mosaic alternate from column to column as they do from row to row, which fields do not. Goes wrong: a motion that
-//! is all along the columns shifts nothing along the rows.
+//! In: a picture and where its corners are. Out: how far its two fields lie apart where the board moved between them;
+//! corners measured in such a picture are those of two boards. Method: at each edge a row is compared with the mean of
+//! the rows above and below; what they differ by, over the grey value's slope along the row, is a shift. Between fields
+//! it alternates from row to row. The same sums with a sign that alternates every two rows hold noise, slanted edges
+//! and blur just as well, and no fields. Colours that were interpolated from a mosaic alternate from column to column
+//! as they do from row to row, which fields do not. Goes wrong: a motion that is all along the columns shifts nothing
+//! along the rows.
 
 use nalgebra::{Matrix3, Point2, Vector2, Vector3};
 
@@ -19,22 +20,23 @@ const CORNERS: usize = 60;
 const FEWEST: usize = 6;
 /// How many times larger than the control a shift is that is none by chance.
 const BEYOND_CHANCE: f64 = 4.0;
-/// Share of the shifts' squares that is a motion of the whole board. Colours that were interpolated from a mosaic leave shifts
-/// between rows too, of either sign from edge to edge.
+/// Share of the shifts' squares that is a motion of the whole board. Colours that were interpolated from a mosaic leave
+/// shifts between rows too, of either sign from edge to edge.
 const COMMON: f64 = 0.5;
 /// Share of the squares of the shifts between rows that those between columns are where it is a mosaic.
 const ALIKE: f64 = 0.25;
-/// Least shift that matters, px. Sensors with two read-out paths have rows of unequal gain, which shifts nothing; colours that a camera
-/// interpolates from its mosaic leave up to 0.05 px in pictures of one moment.
+/// Least shift that matters, px. Sensors with two read-out paths have rows of unequal gain, which shifts nothing;
+/// colours that a camera interpolates from its mosaic leave up to 0.05 px in pictures of one moment.
 const LEAST_SHIFT_PX: f64 = 0.06;
-/// Fields nearer to each other than this, px, are one picture: the box of a pixel alone blurs as much, 1/sqrt(12). A corner is then that of the
-/// mean of two moments, and as uncertain as half of what lies between them.
+/// Fields nearer to each other than this, px, are one picture: the box of a pixel alone blurs as much, 1/sqrt(12). A
+/// corner is then that of the mean of two moments, and as uncertain as half of what lies between them.
 pub const ONE_PICTURE_PX: f64 = 0.289;
 /// Half of what is looked at round a corner, px and in squares.
 const HALF_PX: f64 = 40.0;
 const HALF_SQUARES: f64 = 0.45;
 
-/// How far the rows of one field lie from those of the other, px; `None` where they were taken together. `places` are in the picture.
+/// How far the rows of one field lie from those of the other, px; `None` where they were taken together. `places` are
+/// in the picture.
 pub fn shift_between_fields(picture: &Picture, places: &Places) -> Option<f64> {
     match &picture.grey {
         Grey::Eight(image) => shift(image, places),
@@ -112,8 +114,8 @@ fn around<T: Copy + Into<i32>>(image: &Image<T>, corner: &Point2<f64>, half: f64
     (weight > 0).then(|| sums.map(|sum| -2.0 * sum as f64 / weight as f64))
 }
 
-/// Over a line's pixels: the sum of the slope along the rows times what the line differs by from those above and below, and that of the
-/// slope's square. Whole numbers: slopes times four, differences times two.
+/// Over a line's pixels: the sum of the slope along the rows times what the line differs by from those above and below,
+/// and that of the slope's square. Whole numbers: slopes times four, differences times two.
 #[inline(always)]
 fn line_sums<T: Copy + Into<i32>>([above, here, below]: [&[T]; 3]) -> [i64; 2] {
     let (mut along, mut square) = (0, 0);

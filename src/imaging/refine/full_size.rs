@@ -1,7 +1,8 @@
 //! Fits at full size: one corner in one window.
 //!
-//! In: a corner's surroundings and what its fit starts from. Out: the fit, or none where it is not plausible. Three windows: a near one, just large
-//! enough to hold an arm on each side of the crossing; the full one, as large as the squares and the picture's light allow; and what lies between.
+//! In: a corner's surroundings and what its fit starts from. Out: the fit, or none where it is not plausible. Three
+//! windows: a near one, just large enough to hold an arm on each side of the crossing; the full one, as large as the
+//! squares and the picture's light allow; and what lies between.
 
 use std::cell::RefCell;
 
@@ -23,13 +24,13 @@ const BAND_BLURS: f64 = 3.5;
 /// The next edge's blur reaches this many blurs into the square.
 const MARGIN_BLURS: f64 = 3.0;
 
-/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size the bend of the
-/// edges, known from the board's other corners, is still known well enough.
+/// Half of the largest window, px. The gain goes with the root of the window, the time with the window; at this size
+/// the bend of the edges, known from the board's other corners, is still known well enough.
 const MOST_HALF_PX: f64 = 250.0;
 /// The same where light is clipped: what the edges then miss of it does not fall with the window.
 const MOST_CLIPPED_HALF_PX: f64 = 80.0;
-/// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places; from windows that reach
-/// from crossing to crossing nobody could tell which crossing it is.
+/// What a window leaves of each edge at least, as a share of it. Edges bend at crossings that are off their places;
+/// from windows that reach from crossing to crossing nobody could tell which crossing it is.
 const LEAST_MARGIN: f64 = 0.15;
 /// Half of the near window, px and in blurs: the least that holds an arm on each side of the crossing.
 const NEAR_HALF_PX: f64 = 10.0;
@@ -41,8 +42,9 @@ const SMALLEST: f64 = 0.5;
 /// A near window that is not smaller than this share of the full one would tell nothing of its own.
 const NEAR_SHARE: f64 = 0.7;
 
-/// By how many blurs a window's own bend may take the ends of its edges from where they were thought to be, beyond which another fit starts from
-/// there, and in how many rounds: within it the edges' profiles are as good as straight lines.
+/// By how many blurs a window's own bend may take the ends of its edges from where they were thought to be, beyond
+/// which another fit starts from there, and in how many rounds: within it the edges' profiles are as good as straight
+/// lines.
 const MOST_BENT_BLURS: f64 = 0.3;
 const MOST_ROUNDS: usize = 6;
 /// By how much wider than it was thought to be a blur may be for what its window leaves out to be right.
@@ -86,7 +88,8 @@ impl<T: Sample> Full<'_, T> {
         Full { stray: Some(variance), ..*self }
     }
 
-    /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if that is of full size.
+    /// A fit in the near window, where the full one is enough larger to tell more; otherwise what the copy told, if
+    /// that is of full size.
     pub(super) fn near(&self, cell: Cell, start: Model, coarse: Option<Measured>) -> Windows {
         let full_px = half_px(cell.side(), margin_px(&start, &cell));
         let near_px = near_half_px(&start);
@@ -95,12 +98,14 @@ impl<T: Sample> Full<'_, T> {
         Windows { cell, start, bends: [None; 2], alone, most_half_px: MOST_HALF_PX, near, full: None }
     }
 
-    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are taken where they are
-    /// cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near an edge.
+    /// A fit in the full window or in a share of it, started where the one in the near window ended: most steps are
+    /// taken where they are cheap, and the blur is that of the picture, not of the copy, so fewer pixels count as near
+    /// an edge.
     pub(super) fn full(&self, seen: Windows, share: f64) -> Windows {
         let within = |half_px: f64| match seen.near.filter(|_| !seen.alone) {
             Some(near) => self.fit_from(&near, half_px, &seen),
-            // Squares that are not alike all over show in a small window as a light that changes, and in a large one hardly.
+            // Squares that are not alike all over show in a small window as a light that changes, and in a large one
+            // hardly.
             None => self.fit_within(half_px, &seen.cell, &seen.start),
         };
         // What is hardly larger than the near window is not made smaller.
@@ -118,8 +123,8 @@ impl<T: Sample> Full<'_, T> {
         Windows { full, most_half_px, ..seen }
     }
 
-    /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it cannot explain, where
-    /// they are few.
+    /// A corner whose pixels lie farther from the model than is usual on the board, fitted again without those that it
+    /// cannot explain, where they are few.
     fn without_outlying(&self, first: &Measured, most_half_px: f64, cell: &Cell, board: &Board) -> Measured {
         let clips = first.fit.left_out > 0;
         if !clips && !board.is_rough(first) {
@@ -156,7 +161,8 @@ impl<T: Sample> Full<'_, T> {
         between.or_else(|| board.holds_in_small_window(near).then_some(*near))
     }
 
-    /// What the windows of a corner tell that none of them shows well, and one that is smaller still, without outlying pixels.
+    /// What the windows of a corner tell that none of them shows well, and one that is smaller still, without outlying
+    /// pixels.
     pub(super) fn windows_left(&self, seen: &Windows, board: &Board) -> Vec<Measured> {
         let any = Full { most_light_change: ALL_LIGHT, ..*self };
         let near_px = near_half_px(&seen.start);
@@ -176,7 +182,8 @@ impl<T: Sample> Full<'_, T> {
 
     /// A fit in a larger window, from what a smaller one told.
     pub(super) fn fit_from(&self, near: &Measured, most_half_px: f64, seen: &Windows) -> Option<Measured> {
-        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the other.
+        // A window in the middle of which the corner is: what the light's gradient adds on one side it takes on the
+        // other.
         let bend = [0, 1].map(|k| if seen.cell.own_bends[k] { near.fit.model.bend[k] } else { seen.start.bend[k] });
         let start = Model { corner: Vector2::zeros(), bend, ..near.fit.model };
         self.fit_within(most_half_px, &Cell { place: near.px, ..seen.cell }, &start)
@@ -187,8 +194,8 @@ impl<T: Sample> Full<'_, T> {
         self.fit_kept(most_half_px, cell, start, &Below(self.clip_level - self.veil))
     }
 
-    /// A window beside markers that stays in the picture: what is cut off on one side alone moves a corner of oblique edges, and parts of boards
-    /// reach the picture's border everywhere.
+    /// A window beside markers that stays in the picture: what is cut off on one side alone moves a corner of oblique
+    /// edges, and parts of boards reach the picture's border everywhere.
     fn inside(&self, cell: &Cell, halves: [Vector2<f64>; 2]) -> [Vector2<f64>; 2] {
         if !cell.has_markers() {
             return halves;
@@ -240,8 +247,8 @@ impl<T: Sample> Full<'_, T> {
     }
 }
 
-/// The shares of both halves of a window that stays within so many px of its middle along x and y: those by which the corner is known best. How well it
-/// is known across an edge goes with the root of how long that edge is.
+/// The shares of both halves of a window that stays within so many px of its middle along x and y: those by which the
+/// corner is known best. How well it is known across an edge goes with the root of how long that edge is.
 fn shares_inside(halves: &[Vector2<f64>; 2], room_px: [f64; 2]) -> [f64; 2] {
     /// Of a third less a step.
     const STEPS: usize = 40;

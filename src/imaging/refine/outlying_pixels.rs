@@ -1,9 +1,10 @@
 //! Pixels that a corner cannot explain: hot ones and hot columns, and those that a clipped channel has pulled down.
 //!
-//! In: a corner's fit and what is usual on its board. Out: which pixels a second fit leaves out. A pixel is out where it lies
-//! far from the first fit in the noise of the board and in the contrast, so that neither noise nor a blur that is no Gaussian costs pixels; beside clipped
-//! pixels also where the fit comes near the level at which they clip, since of those only the darker ones would be left.
-//! Goes wrong: something before the board, which takes more of the window; [`few`] tells them apart.
+//! In: a corner's fit and what is usual on its board. Out: which pixels a second fit leaves out. A pixel is out where
+//! it lies far from the first fit in the noise of the board and in the contrast, so that neither noise nor a blur that
+//! is no Gaussian costs pixels; beside clipped pixels also where the fit comes near the level at which they clip, since
+//! of those only the darker ones would be left. Goes wrong: something before the board, which takes more of the window;
+//! [`few`] tells them apart.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -15,7 +16,8 @@ use super::saddle_fit::window::Keep;
 
 /// A pixel is out where it lies this many standard deviations of the board's noise from the first fit...
 const MOST_SIGMAS: f64 = 6.0;
-/// ... and this share of half the contrast, which no blur of a lens adds; less than that remains of what hides a square.
+/// ... and this share of half the contrast, which no blur of a lens adds; less than that remains of what hides a
+/// square.
 const MOST_CONTRAST: f64 = 0.15;
 /// Standard deviations below the level at which pixels clip where none of them has been clipped yet.
 const CLIP_SIGMAS: f64 = 3.0;
@@ -36,8 +38,8 @@ pub(super) struct Explained {
 }
 
 impl Explained {
-    /// What `first` explains, in a window that starts at its place; `roughness` is the board's usual residual as a share of half the contrast,
-    /// `clips` whether there are clipped pixels in the window.
+    /// What `first` explains, in a window that starts at its place; `roughness` is the board's usual residual as a
+    /// share of half the contrast, `clips` whether there are clipped pixels in the window.
     pub(super) fn by(first: &Measured, roughness: f64, clip_level: f64, clips: bool) -> Explained {
         let model = Model { corner: Vector2::zeros(), ..first.fit.model };
         let half_contrast = model.half_contrast.abs();

@@ -1,16 +1,19 @@
 //! Do a board's corners scatter as the noise in their windows says?
 //!
-//! In: the fits of a board's corners. Out: by what factors their covariances are to be larger or smaller. A covariance by the residuals' variance
-//! holds for noise that is independent from pixel to pixel and even over the window. Compression leaves noise that is alike over
-//! blocks, clipping leaves dark pixels that are quieter than the edges, sharpening an overshoot that is none, stray light a gradient that is
-//! not the model's. What all of these do to a corner is seen in its arms: each tells a step and a turn of its own, by pixels of its own, and how
-//! far the arms miss the common model beyond what their covariance allows is how far the corner scatters beyond it. What scatters a corner shows
-//! both in how edges bend at the crossing and in how far their arms are apart there. Edges that bend but are not apart are those of a print whose
-//! crossings are off their places: that is alike in all its pictures, and no scatter.
+//! In: the fits of a board's corners. Out: by what factors their covariances are to be larger or smaller. A covariance
+//! by the residuals' variance holds for noise that is independent from pixel to pixel and even over the window.
+//! Compression leaves noise that is alike over blocks, clipping leaves dark pixels that are quieter than the edges,
+//! sharpening an overshoot that is none, stray light a gradient that is not the model's. What all of these do to a
+//! corner is seen in its arms: each tells a step and a turn of its own, by pixels of its own, and how far the arms miss
+//! the common model beyond what their covariance allows is how far the corner scatters beyond it. What scatters a
+//! corner shows both in how edges bend at the crossing and in how far their arms are apart there. Edges that bend but
+//! are not apart are those of a print whose crossings are off their places: that is alike in all its pictures, and no
+//! scatter.
 //!
-//! Method: the ratio of chi-squared to its mean under noise, pooled over the board; where corners differ in it by more than chance
-//! each has a ratio of its own, drawn to the board's by an inverse chi-squared prior whose degrees of freedom come from the logarithms' scatter
-//! (Smyth 2004). A board whose ratio is one within its error is left as it is, to the bit. Goes wrong: what moves all arms of a corner alike.
+//! Method: the ratio of chi-squared to its mean under noise, pooled over the board; where corners differ in it by more
+//! than chance each has a ratio of its own, drawn to the board's by an inverse chi-squared prior whose degrees of
+//! freedom come from the logarithms' scatter (Smyth 2004). A board whose ratio is one within its error is left as it
+//! is, to the bit. Goes wrong: what moves all arms of a corner alike.
 
 use std::f64::consts::LN_2;
 

@@ -1,14 +1,15 @@
 //! Coarse corners to measured ones: a fit of the blurred corner to the raw pixels at full size, for each corner.
 //!
-//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced copy in a small
-//! window (`coarse`); then at full size in a small window (near), and in the largest that stays inside the four squares round
-//! it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the near windows show them, and at last as the
-//! full ones do. Where some of the full windows tell that edges bend much from crossing to crossing, all are cut down. Where the larger
-//! window does not agree with the smaller one, or the four arms of a corner not with each other (`acceptance`), something hides a part of
-//! it, and the largest window that is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows
-//! it. Last, corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows well, and
-//! share what they know of the light, which counts from the picture's veil (`light`). Goes wrong: a corner without contrast,
-//! hidden, or cut off by the border; it is dropped, the others stay.
+//! In: the picture and the board as detected. Out: corners with covariance. First each corner is fitted on the reduced
+//! copy in a small window (`coarse`); then at full size in a small window (near), and in the largest that stays inside
+//! the four squares round it (full), along edges that bend as the lens bends the board's lines (`curvature`): as the
+//! near windows show them, and at last as the full ones do. Where some of the full windows tell that edges bend much
+//! from crossing to crossing, all are cut down. Where the larger window does not agree with the smaller one, or the
+//! four arms of a corner not with each other (`acceptance`), something hides a part of it, and the largest window that
+//! is free of it is kept. Stray light that adds to dark and bright alike is fitted where the board shows it. Last,
+//! corners get the covariances that they have by what their arms tell (`scatter`), also those that no window shows
+//! well, and share what they know of the light, which counts from the picture's veil (`light`). Goes wrong: a corner
+//! without contrast, hidden, or cut off by the border; it is dropped, the others stay.
 
 use std::cell::RefCell;
 
@@ -135,7 +136,8 @@ impl<T: Sample> Full<'_, T> {
             let start = Model {
                 corner: Vector2::zeros(),
                 bend: bends.map(|bend| bend.map_or(0.0, |bend| bend.per_px)),
-                // The copy's grey values are not those above the veil: without contrast the fit finds levels of its own.
+                // The copy's grey values are not those above the veil: without contrast the fit finds levels of its
+                // own.
                 half_contrast: 0.0,
                 ..enlarged(&from.fit.model, scale)
             };
@@ -146,7 +148,8 @@ impl<T: Sample> Full<'_, T> {
             let near = self.near(cell, start, first);
             Some(Windows { bends, ..near })
         });
-        // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large ones from.
+        // A bend as the copy shows it is good enough for small windows only; as small windows show it, to start large
+        // ones from.
         let near_only: Vec<Measured> = near.iter().filter_map(|(_, _, windows)| windows.near).collect();
         let board = acceptance::Board::of(&near_only, &[]);
         let near_bends = bends_by(&near, &places, |windows| windows.near.filter(|near| board.accepts(near)));
@@ -156,10 +159,11 @@ impl<T: Sample> Full<'_, T> {
         Seen { windows, board, measured }
     }
 
-    /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these windows show it;
-    /// with what is usual in them.
+    /// The fits in full windows, or where edges bend too much for these in smaller ones, along edges that bend as these
+    /// windows show it; with what is usual in them.
     fn large(&self, near: &Lattice<Windows>, places: &Places) -> (Lattice<Windows>, acceptance::Board) {
-        // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not be looked at.
+        // How much edges bend is seen on some of the corners as well: where full windows are of no use, most need not
+        // be looked at.
         let few = near.count() < LEAST_TRIED * TRIED;
         let tried = near.filter_map(|col, row, seen| {
             (few || (col + row).is_multiple_of(TRIED)).then(|| self.full(seen.clone(), 1.0))
@@ -183,8 +187,9 @@ impl<T: Sample> Full<'_, T> {
     }
 }
 
-/// Whether corners follow each other along the board's lines less evenly than other fits of them, beyond what their covariances and chance
-/// allow. Overshoot of a sharpened edge may look like stray light, with the corner beside its place, to another side at each.
+/// Whether corners follow each other along the board's lines less evenly than other fits of them, beyond what their
+/// covariances and chance allow. Overshoot of a sharpened edge may look like stray light, with the corner beside its
+/// place, to another side at each.
 fn is_more_uneven(corners: &Lattice<Measured>, others: &Lattice<Measured>) -> bool {
     /// Standard errors of a share of one half; differences overlap, hence more than for independent ones.
     const BEYOND_CHANCE: f64 = 4.0;
@@ -194,8 +199,8 @@ fn is_more_uneven(corners: &Lattice<Measured>, others: &Lattice<Measured>) -> bo
     beyond_half > BEYOND_CHANCE * 0.5 * (more.len() as f64).sqrt()
 }
 
-/// Third differences of the corners' places along the board's lines, which are next to nothing of a board that a lens shows, in units of what
-/// the corners' covariances say of them; `None` where a corner is missing.
+/// Third differences of the corners' places along the board's lines, which are next to nothing of a board that a lens
+/// shows, in units of what the corners' covariances say of them; `None` where a corner is missing.
 fn third_differences(corners: &Lattice<Measured>) -> impl Iterator<Item = Option<f64>> {
     const STEPS: [[usize; 2]; 2] = [[1, 0], [0, 1]];
     const WEIGHTS: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
@@ -225,14 +230,16 @@ mod tests {
     const SIDE_PX: f64 = 60.0;
     const BLUR_PX: f64 = 0.9;
 
-    /// Light minus dark across the nearest of lines 0 to `lines`, which are a `side` apart, in the signs of the squares.
+    /// Light minus dark across the nearest of lines 0 to `lines`, which are a `side` apart, in the signs of the
+    /// squares.
     fn across(px: f64, lines: f64, side: f64) -> f64 {
         let nearest = (px / side).round().clamp(0.0, lines);
         let sign = if nearest.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
         sign * erf((px - nearest * side) / (BLUR_PX * 2f64.sqrt()))
     }
 
-    /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2 grey levels.
+    /// A board of 8x7 squares whose every other row of crossings is off by `zigzag_px` along the rows, with noise of 2
+    /// grey levels.
     fn zigzag_board(zigzag_px: f64) -> Picture {
         let grey = |x: f64, y: f64| {
             let y = y - 60.3;
@@ -313,8 +320,9 @@ mod tests {
         }
     }
 
-    /// An upright board of 9x7 squares of 25 px, its edges as sharp as pixels are, with `overshoot` (a share of the contrast) beside them as a
-    /// camera's sharpening leaves it, and stray light whose slope is up to `stray` grey values per px.
+    /// An upright board of 9x7 squares of 25 px, its edges as sharp as pixels are, with `overshoot` (a share of the
+    /// contrast) beside them as a camera's sharpening leaves it, and stray light whose slope is up to `stray` grey
+    /// values per px.
     fn sharpened_board(overshoot: f64, stray: f64) -> Picture {
         let (width, height, side) = (280, 230, 25.2);
         let grey = |x: f64, y: f64| {

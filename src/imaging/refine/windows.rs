@@ -51,8 +51,8 @@ impl Windows {
         Windows { start, bends, full: self.full.map(|full| full.rebent(bend, &self.cell)), ..self }
     }
 
-    /// A corner with what the bends of its edges, as the board's lines show them, make of its covariance. Whole boards have lines so long that it is
-    /// hardly anything.
+    /// A corner with what the bends of its edges, as the board's lines show them, make of its covariance. Whole boards
+    /// have lines so long that it is hardly anything.
     pub(super) fn with_lines(&self, corner: Measured) -> Measured {
         if !self.cell.has_markers() {
             return corner;

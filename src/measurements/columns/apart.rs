@@ -1,8 +1,10 @@
-//! A column that sets rows apart: the number of the reflector that a row was measured at, or of the place where the robot or the sensor stood.
+//! A column that sets rows apart: the number of the reflector that a row was measured at, or of the place where the
+//! robot or the sensor stood.
 //!
-//! In: the way that a table is read, and the nominal robot. Out: a column that is not used, whose values each have a tool and a place of their own: the
-//! robot then comes several times nearer to the points than with one tool and one place for all. What goes wrong: a column of few rows a value tells
-//! nothing, and whether it is the reflector or the place only the table's owner knows; it is asked.
+//! In: the way that a table is read, and the nominal robot. Out: a column that is not used, whose values each have a
+//! tool and a place of their own: the robot then comes several times nearer to the points than with one tool and one
+//! place for all. What goes wrong: a column of few rows a value tells nothing, and whether it is the reflector or the
+//! place only the table's owner knows; it is asked.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +24,8 @@ const MOST_WAYS: usize = 200;
 /// Rows that each value must have: of 8 rows 24 numbers are held against 9 unknowns.
 const FEWEST: usize = 8;
 
-/// How many times nearer the robot must come. Nine more unknowns a value reduce what is left of mere noise to 0.79 of it, of eight rows a value.
+/// How many times nearer the robot must come. Nine more unknowns a value reduce what is left of mere noise to 0.79 of
+/// it, of eight rows a value.
 const CLEAR: f64 = 4.0;
 
 /// What is left is more than a robot's own errors, mm: below it a table is read as it stands.

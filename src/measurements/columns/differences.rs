@@ -1,8 +1,9 @@
 //! Columns of what a point is off by from where the robot was sent.
 //!
-//! In: a file with names. Out: the columns of such a difference along x, y and z, where names say it. They are not added to the commanded point: of two
-//! signs nothing says which, and one of them leaves twice the robot's error. What goes wrong: turns about axes and uncertainties have names alike; a
-//! name with a letter of an axis beside a word for a difference is taken for one.
+//! In: a file with names. Out: the columns of such a difference along x, y and z, where names say it. They are not
+//! added to the commanded point: of two signs nothing says which, and one of them leaves twice the robot's error. What
+//! goes wrong: turns about axes and uncertainties have names alike; a name with a letter of an axis beside a word for a
+//! difference is taken for one.
 
 use super::part::Part;
 use crate::tables::names::{Unit, words};

@@ -1,10 +1,11 @@
-//! Columns and units held against the nominal robot: the right ones leave what a built robot is off by, wrong ones what the points are apart.
+//! Columns and units held against the nominal robot: the right ones leave what a built robot is off by, wrong ones what
+//! the points are apart.
 //!
-//! In: ways to read a table. Out: the one that is taken, and how sure it is. The tool and the sensor's place are solved for each (see
-//! [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured points, whichever is less. A way is taken
-//! where it is near, no choice of other columns is, and other units leave several times as much.
-//! What goes wrong: poses that hardly vary, and a robot file with other conventions, decide nothing; the sizes of the numbers do then, where
-//! they can.
+//! In: ways to read a table. Out: the one that is taken, and how sure it is. The tool and the sensor's place are solved
+//! for each (see [`Robot::fit_tool`]); what is left is judged as a share of the spread of the predicted or the measured
+//! points, whichever is less. A way is taken where it is near, no choice of other columns is, and other units leave
+//! several times as much. What goes wrong: poses that hardly vary, and a robot file with other conventions, decide
+//! nothing; the sizes of the numbers do then, where they can.
 
 use std::f64::consts::TAU;
 
@@ -17,24 +18,26 @@ use crate::robot::tool_fit::{Start, middle_spread};
 use crate::robot::{Joint, Robot};
 use crate::tables::names::{Unit, What};
 
-/// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is of this robot: a robot of a
-/// metre's reach that is off by five hundredths of it is none that was built. Points that have nothing to do with the joints leave a share whose
-/// square is distributed as Beta(f / 2, 9 / 2), f = 3 n - 9 numbers of n rows being left beside placement and tool: less than this with a
-/// probability of 4e-7 for five rows, and with 1e-3 for four, which is too much where a thousand choices of columns are tried.
+/// What is left as a share of the points' spread at the most where columns and units are right and the robot's file is
+/// of this robot: a robot of a metre's reach that is off by five hundredths of it is none that was built. Points that
+/// have nothing to do with the joints leave a share whose square is distributed as Beta(f / 2, 9 / 2), f = 3 n - 9
+/// numbers of n rows being left beside placement and tool: less than this with a probability of 4e-7 for five rows, and
+/// with 1e-3 for four, which is too much where a thousand choices of columns are tried.
 pub(in crate::measurements) const NEAR: f64 = 0.05;
 
 /// Rows from which on chance does not come near.
 const FEWEST: usize = 5;
 
-/// How many times more another unit must leave: the ratio of two mean squares of f = 6 numbers, those of five rows, exceeds the square of it by
-/// chance in one of five hundred.
+/// How many times more another unit must leave: the ratio of two mean squares of f = 6 numbers, those of five rows,
+/// exceeds the square of it by chance in one of five hundred.
 const CLEAR: f64 = 4.0;
 
-/// How many times more a unit that a name states must leave than another for the name to be wrong: the square of it is exceeded by chance in one
-/// of a hundred thousand for five rows, and a name is worth more than a guess.
+/// How many times more a unit that a name states must leave than another for the name to be wrong: the square of it is
+/// exceeded by chance in one of a hundred thousand for five rows, and a name is worth more than a guess.
 const WRONG: f64 = 10.0;
 
-/// A nominal robot that predicts points to this, mm, has computed them: no instrument reads points of a moving arm to a micrometre.
+/// A nominal robot that predicts points to this, mm, has computed them: no instrument reads points of a moving arm to a
+/// micrometre.
 const COMPUTED_MM: f64 = 1e-3;
 
 /// Points beyond this are in no metres.
@@ -61,8 +64,8 @@ impl Way {
         Way { picked: picked.clone(), joints, lengths, left: None, left_mm: f64::INFINITY }
     }
 
-    /// With what the nominal robot leaves of these columns in these units; of rows that name their placement or their target those of the one
-    /// that has most.
+    /// With what the nominal robot leaves of these columns in these units; of rows that name their placement or their
+    /// target those of the one that has most.
     fn judged(mut self, parts: &[Part], robot: &Robot) -> Way {
         let rows = most_alike(parts, &self.picked);
         let some: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect();
@@ -194,7 +197,8 @@ pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], rob
         };
     }
     if near(&best) {
-        // Points that were commanded or computed are nearer to the nominal robot than those that were measured: two that are near are asked about.
+        // Points that were commanded or computed are nearer to the nominal robot than those that were measured: two
+        // that are near are asked about.
         let others: Vec<&Way> = ways.iter().filter(|way| way.picked != best.picked && near(way)).collect();
         if let Some(other) = others.first() {
             let (first, second) = apart(&best, &others).unwrap_or((best.clone(), (*other).clone()));
@@ -218,7 +222,8 @@ pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], rob
     by_sizes(parts, &candidates[0], forced, &ways)
 }
 
-/// The same without those of several guessed targets that the robot does not carry: three angles beside a point keep about one distance from it, too.
+/// The same without those of several guessed targets that the robot does not carry: three angles beside a point keep
+/// about one distance from it, too.
 fn points_that_fit(
     parts: &[Part],
     picked: &Picked,
@@ -243,7 +248,8 @@ fn points_that_fit(
     Picked { points, ..picked.clone() }
 }
 
-/// Of a way with several targets two, one that the nominal robot computed and one that it did not: these are no two targets of a body.
+/// Of a way with several targets two, one that the nominal robot computed and one that it did not: these are no two
+/// targets of a body.
 fn computed_beside_measured(parts: &[Part], best: &Way, robot: &Robot) -> Option<(Way, Way)> {
     let alone = |target: &(String, [At; 3])| {
         let picked = Picked { points: vec![target.clone()], ..best.picked.clone() };
@@ -256,14 +262,16 @@ fn computed_beside_measured(parts: &[Part], best: &Way, robot: &Robot) -> Option
     Some((computed.clone(), measured.clone()))
 }
 
-/// The way in the units that are stated, of the best one's columns: that which differs from it in one unit, where there is one.
+/// The way in the units that are stated, of the best one's columns: that which differs from it in one unit, where there
+/// is one.
 fn nearest_stated(ways: &[Way], best: &Way, is_stated: &dyn Fn(&Way) -> bool) -> Option<Way> {
     let differences = |way: &Way| usize::from(way.joints != best.joints) + usize::from(way.lengths != best.lengths);
     let of_columns = ways.iter().filter(|way| way.picked == best.picked && is_stated(way));
     of_columns.min_by_key(|way| differences(way)).cloned()
 }
 
-/// Two of the ways that have no column in common, the first ones: y and z of one point with x of the next are a point as well, turned.
+/// Two of the ways that have no column in common, the first ones: y and z of one point with x of the next are a point
+/// as well, turned.
 fn apart(best: &Way, others: &[&Way]) -> Option<(Way, Way)> {
     let start = |way: &Way| way.picked.points.first().map(|(_, at)| at[0]);
     let mut alike: Vec<&Way> = others.iter().copied().filter(|w| w.picked.joints == best.picked.joints).collect();

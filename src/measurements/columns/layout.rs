@@ -1,8 +1,9 @@
-//! Which columns are the joints and which the points where no name says it, or names that are not known: every way that the counts allow, for the
-//! nominal robot to decide.
+//! Which columns are the joints and which the points where no name says it, or names that are not known: every way that
+//! the counts allow, for the nominal robot to decide.
 //!
-//! Columns of zeros, of words and of the row's number are none of them, nor columns whose names say that they are something else. Joints stand
-//! side by side, as many as the robot has; so do the three numbers of a point. Where columns remain that are as many points side by side, and these keep their distances from row to row or are one
+//! Columns of zeros, of words and of the row's number are none of them, nor columns whose names say that they are
+//! something else. Joints stand side by side, as many as the robot has; so do the three numbers of a point. Where
+//! columns remain that are as many points side by side, and these keep their distances from row to row or are one
 //! point, they are several targets, or several readings.
 
 use nalgebra::Point3;
@@ -14,9 +15,10 @@ use crate::statistics::median;
 /// Columns of a file without names in which joints and points are looked for.
 const MOST_FREE: usize = 60;
 
-/// Two points that a body carries keep their distance within this share of it, in the middle of all rows: targets 10 mm apart that are read to
-/// half a millimetre do. Points that differ by errors of three normal numbers, one commanded and one measured, are apart by 1.54 standard
-/// deviations in the middle of all rows, and half of them differ from that by more than 0.46: three tenths of it.
+/// Two points that a body carries keep their distance within this share of it, in the middle of all rows: targets 10 mm
+/// apart that are read to half a millimetre do. Points that differ by errors of three normal numbers, one commanded and
+/// one measured, are apart by 1.54 standard deviations in the middle of all rows, and half of them differ from that by
+/// more than 0.46: three tenths of it.
 const RIGID: f64 = 0.05;
 
 /// Numbers of a transform but for its last row, which says nothing.
@@ -28,8 +30,9 @@ const ROUNDED: f64 = 2e-3;
 /// Rows that tell whether a distance is kept.
 const ROWS: usize = 200;
 
-/// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a millimetre, rows are a hundred
-/// and more apart, and what was commanded differs from what was measured by tenths at the least.
+/// Readings within this share of what the rows are apart are of one point: an instrument repeats to hundredths of a
+/// millimetre, rows are a hundred and more apart, and what was commanded differs from what was measured by tenths at
+/// the least.
 pub(in crate::measurements) const ONE_POINT: f64 = 1e-3;
 
 /// All ways to complete what the names say; columns of zeros are joints only where there is none without them.
@@ -65,7 +68,8 @@ fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> 
             let kept = all.windows(2).all(|two| is_kept(distances(parts, &two[0], &two[1])));
             let whole = 3 * all.len() == total;
             let several = of_points(all.into_iter().enumerate().map(|(i, at)| ((i + 1).to_string(), at)).collect());
-            // Two that are nearly one may be what was commanded and what was measured: without names only three or more are readings of one point.
+            // Two that are nearly one may be what was commanded and what was measured: without names only three or more
+            // are readings of one point.
             let readings = several.points.len() > 2 && are_readings(parts, &several);
             if whole && (kept || readings) {
                 list.push(several);
@@ -84,7 +88,8 @@ fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> 
     list
 }
 
-/// The last column of a transform that is written row by row from this column on: rows of a rotation, each with a coordinate behind it.
+/// The last column of a transform that is written row by row from this column on: rows of a rotation, each with a
+/// coordinate behind it.
 fn translation(parts: &[Part], first: At) -> Option<[At; 3]> {
     let at = |entry: usize| At { column: first.column + entry, ..first };
     let file = &parts[first.part];

@@ -57,8 +57,8 @@ pub(in crate::measurements) struct Part {
 const NOTHING: [&str; 11] = ["", "nan", "na", "n/a", "#n/a", "-", "--", "---", "null", "none", "inf"];
 
 impl Part {
-    /// Reads a file; a program's targets have the robot's joints, so many. Names that do not fit the columns are an error, unless the columns are
-    /// `named` otherwise.
+    /// Reads a file; a program's targets have the robot's joints, so many. Names that do not fit the columns are an
+    /// error, unless the columns are `named` otherwise.
     pub fn read(path: &Utf8Path, joints: usize, named: bool) -> Result<Part> {
         let hint = "`stereocal measure POSES` writes out/measurements.csv; `--measurements FILE` names another";
         let grid = Grid::read_with_programs(path, "measurements file", hint, joints)?;
@@ -266,7 +266,8 @@ fn understood(names: &[String]) -> Vec<Name> {
 /// More targets than a body has.
 const MANY: usize = 8;
 
-/// A `target` of which each row has one of its own is the name of the row: the targets of a body come again at other poses.
+/// A `target` of which each row has one of its own is the name of the row: the targets of a body come again at other
+/// poses.
 fn target_as_name(meanings: &mut [Name], rows: &[(u64, Fields)]) {
     let own = |wanted: &str| meanings.iter().position(|n| matches!(n.what, What::Own(own) if own == wanted));
     let Some(column) = own("target").filter(|_| own("pose").is_none() && rows.len() > MANY) else { return };
@@ -277,8 +278,8 @@ fn target_as_name(meanings: &mut [Name], rows: &[(u64, Fields)]) {
     }
 }
 
-/// Numbers of a program's line beyond the robot's joints are those of axes that it does not have; in a language that is known the targets' names stand
-/// there.
+/// Numbers of a program's line beyond the robot's joints are those of axes that it does not have; in a language that is
+/// known the targets' names stand there.
 fn of_program(column: usize, joints: usize, degrees: bool) -> Name {
     let what = match column {
         _ if column < joints => What::Joint(column + 1),

@@ -1,8 +1,9 @@
 //! Which columns are the joints and which the measured points, by their names.
 //!
-//! Joints are a set of as many columns as the robot has joints, numbered from 1 or 0 without a gap and of one word; a set that is not complete (a
-//! quaternion `Q0..Q3`) is none. Points are three columns whose names differ in x, y, z alone, or the last column of a 4x4 matrix. Points that
-//! are commanded, nominal or computed by their names are never taken. What goes wrong: two sets that would do are asked about.
+//! Joints are a set of as many columns as the robot has joints, numbered from 1 or 0 without a gap and of one word; a
+//! set that is not complete (a quaternion `Q0..Q3`) is none. Points are three columns whose names differ in x, y, z
+//! alone, or the last column of a 4x4 matrix. Points that are commanded, nominal or computed by their names are never
+//! taken. What goes wrong: two sets that would do are asked about.
 
 use super::differences;
 use super::part::{At, Part};
@@ -117,7 +118,7 @@ pub(in crate::measurements) fn by_names(parts: &[Part], count: usize) -> Result<
     let mut picked = Picked { joints: joints(parts, count)?, ..Picked::default() };
     let distance = groups(parts, |n| (n.what == What::Distance && n.measured != Some(false)).then_some(0));
     let points = points(parts)?;
-    // `x y z` beside a length is where the robot was sent; a point that calls itself measured, or has the contract's own name, is not.
+    // `x y z` beside a length is where the robot was sent; one called measured, or by the contract's name, is not.
     let own = |at: &At| parts[at.part].names.as_ref().is_some_and(|n| n[at.column].eq_ignore_ascii_case("x_mm"));
     let bare = points.iter().all(|(_, at, measured)| *measured != Some(true) && !own(&at[0]));
     match distance.first() {
@@ -357,8 +358,9 @@ pub(in crate::measurements) fn asked(
     parts[first[0].part].refuse(message, Some(&hint))
 }
 
-/// What `--columns` must say to take these columns, and one `more` by its name, which may be `-`; joints or points that names say are added, and the
-/// columns of the measurements' own format, the rows' names and placements among them, keep theirs.
+/// What `--columns` must say to take these columns, and one `more` by its name, which may be `-`; joints or points that
+/// names say are added, and the columns of the measurements' own format, the rows' names and placements among them,
+/// keep theirs.
 pub(in crate::measurements) fn columns_flag(
     parts: &[Part],
     joints: &[At],

@@ -1,4 +1,5 @@
-//! What is said where a table does not tell what its columns are: what was found, what was needed, and the flags that settle it.
+//! What is said where a table does not tell what its columns are: what was found, what was needed, and the flags that
+//! settle it.
 
 use super::judge::{Forced, Way};
 use super::part::{Kind, Part};
@@ -177,7 +178,8 @@ pub(in crate::measurements) fn wrong_unit(parts: &[Part], stated: &Way, better: 
     parts[columns[0].part].refuse(message, Some(&hint))
 }
 
-/// That nothing tells a unit, with flags of which each says both: one that said the open one alone would take back what another had said.
+/// That nothing tells a unit, with flags of which each says both: one that said the open one alone would take back what
+/// another had said.
 pub(in crate::measurements) fn no_unit(parts: &[Part], joints: Option<Unit>, lengths: Option<Unit>) -> Error {
     let open = [(joints, "joints are degrees or radians"), (lengths, "points are mm or m")];
     let what: Vec<&str> = open.iter().filter(|(unit, _)| unit.is_none()).map(|(_, what)| *what).collect();

@@ -7,7 +7,8 @@ use crate::programs::instruction::{Cause, Instruction};
 use crate::programs::language::{Motion, Target, Written};
 use crate::programs::scan;
 
-/// Words of a motion: joint, linear, circular, circular arc, spline; as groups of axes that move independently have them too.
+/// Words of a motion: joint, linear, circular, circular arc, spline; as groups of axes that move independently have
+/// them too.
 const MOTIONS: [&str; 10] = ["J", "L", "C", "A", "S", "JP", "LP", "CP", "AP", "SP"];
 /// How options end, in several languages of the controller, that move a point from where it was taught.
 const OFFSET: &str = "OFFSET";
@@ -64,7 +65,8 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     statements.flat_map(in_statement).collect()
 }
 
-/// The words of a statement that move, each with the group of axes named before it: one that stands first, or that has a position behind it.
+/// The words of a statement that move, each with the group of axes named before it: one that stands first, or that has
+/// a position behind it.
 fn words(code: &str, at: Range<usize>) -> Vec<(Range<usize>, Option<&str>)> {
     let (mut depth, mut seen) = (0i32, at.start);
     let mut found = Vec::new();
@@ -108,7 +110,8 @@ fn option(options: &str) -> Option<Cause> {
     scan::words(&plain).any(|word| LED.contains(&&plain[word])).then_some(Cause::Led)
 }
 
-/// Positions of the program that an instruction writes into, by their numbers; `None` where a register holds the number.
+/// Positions of the program that an instruction writes into, by their numbers; `None` where a register holds the
+/// number.
 fn written(code: &str) -> Vec<Option<u64>> {
     let own = |at: &usize| !code[..*at].ends_with(|c: char| c.is_ascii_alphanumeric() || c == '_');
     let places = code.match_indices("P[").map(|(at, _)| at).filter(own);

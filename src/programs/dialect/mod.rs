@@ -1,4 +1,5 @@
-//! The languages of the makers' controllers, a module each: where joint targets stand, what moves the robot, and programs in it.
+//! The languages of the makers' controllers, a module each: where joint targets stand, what moves the robot, and
+//! programs in it.
 
 mod fanuc;
 mod krl;

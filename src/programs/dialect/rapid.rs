@@ -12,7 +12,8 @@ use crate::programs::variables::{Syntax, Variables};
 /// Robot axes of a jointtarget; more are external ones.
 const AXES: usize = 6;
 
-/// How the words of instructions that move to poses of the tool begin; they have a point, a speed, a zone and a tool at the least.
+/// How the words of instructions that move to poses of the tool begin; they have a point, a speed, a zone and a tool at
+/// the least.
 const CARTESIAN: [&str; 22] = [
     "MoveJ", "MoveL", "MoveC", "TriggJ", "TriggL", "TriggC", "SearchL", "SearchC", "ArcL", "ArcC", "ArcJ", "SpotL",
     "SpotJ", "SpotML", "SpotMJ", "DispL", "DispC", "PaintL", "PaintC", "NutL", "NutJ", "ContactL",
@@ -128,7 +129,8 @@ fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> 
     None
 }
 
-/// The word of a statement that is given a speed or a zone among its arguments: a routine that moves, or an instruction of an option.
+/// The word of a statement that is given a speed or a zone among its arguments: a routine that moves, or an instruction
+/// of an option.
 fn unknown(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> {
     let parts = scan::parts(code, at.clone());
     let numbered = |text: &str, head: char| {

@@ -85,8 +85,8 @@ fn tokens(line: &str) -> impl Iterator<Item = Range<usize>> + '_ {
     scan::runs(line, |c| !c.is_ascii_whitespace())
 }
 
-/// Whether an instruction moves, to its target or otherwise: `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `SMOVL`, `IMOV`, ... A remark begins with an
-/// apostrophe, a label with an asterisk.
+/// Whether an instruction moves, to its target or otherwise: `MOVJ`, `MOVL`, `MOVC`, `MOVS`, `SMOVL`, `IMOV`, ... A
+/// remark begins with an apostrophe, a label with an asterisk.
 fn kind(word: &str) -> Option<Result<(), Cause>> {
     let word = word.to_ascii_uppercase();
     let stem = word.strip_suffix(['J', 'L', 'C', 'S']).unwrap_or(&word);
@@ -128,7 +128,8 @@ fn held(text: &str, point: &str, targets: &[Target], written: &[Option<(char, u6
     Err(Cause::Elsewhere)
 }
 
-/// Positions that instructions write into; `None` for one whose number is computed. Of an instruction that is not known all its positions may be.
+/// Positions that instructions write into; `None` for one whose number is computed. Of an instruction that is not known
+/// all its positions may be.
 fn written(text: &str) -> Vec<Option<(char, u64)>> {
     let of_line = |line: &str| {
         let all: Vec<&str> = tokens(line).map(|token| &line[token]).collect();

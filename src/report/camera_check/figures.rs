@@ -51,7 +51,8 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     })
 }
 
-/// Fig. 6 (a): all long lengths, spread over their pair's number. Of more than can be told apart the worst of every few stay.
+/// Fig. 6 (a): all long lengths, spread over their pair's number. Of more than can be told apart the worst of every few
+/// stay.
 pub(super) fn every_length(accuracy: &Accuracy) -> Vec<(f64, f64)> {
     /// Points of a figure that still loads at once.
     const MOST_POINTS: usize = 3000;
@@ -144,7 +145,8 @@ pub(super) fn volume(judged: &Judged) -> Result<Markup> {
     Ok(page::figure(&svg, &caption))
 }
 
-/// What the lengths along the line of sight are uncertain by: those that boards showed, else those of which none showed any.
+/// What the lengths along the line of sight are uncertain by: those that boards showed, else those of which none showed
+/// any.
 fn along_sight(judged: &Judged, shown_mm: f64) -> String {
     let unseen = judged.facts.volume.along_sight.iter().map(|length| length.sigma_mm()).reduce(f64::max);
     match unseen {

@@ -135,7 +135,8 @@ fn numbers(judged: &Judged) -> [(String, String); 3] {
     ]
 }
 
-/// The checks that are not passed; folded, all of them: what was looked at, what was found, up to where it allows a pass, what it means.
+/// The checks that are not passed; folded, all of them: what was looked at, what was found, up to where it allows a
+/// pass, what it means.
 fn ledger(judged: &Judged) -> Markup {
     // What stands among the things to do is not said again.
     let next = summary::next(judged);

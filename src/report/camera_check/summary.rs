@@ -202,7 +202,8 @@ fn board(calibration: &Calibration, judged: &Judged) -> String {
     format!("board of {}{bow}{check}", calibration.board.said())
 }
 
-/// What to do next: about what happened to the rig and about the board, then what the deciding line asks for, then what the views lack.
+/// What to do next: about what happened to the rig and about the board, then what the deciding line asks for, then what
+/// the views lack.
 pub(super) fn next(judged: &Judged) -> Vec<&str> {
     let passes = judged.verdict == Verdict::Pass;
     let tolerance_mm = judged.facts.tolerance_mm;

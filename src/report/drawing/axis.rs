@@ -78,8 +78,8 @@ pub(super) fn tick(value: f64, range: (f64, f64)) -> String {
     }
 }
 
-/// Exponents of the ticks of a logarithmic axis: powers of ten, where these are few 2 and 5 between them, where these are few the other digits.
-/// Empty where not even two of them lie on the axis.
+/// Exponents of the ticks of a logarithmic axis: powers of ten, where these are few 2 and 5 between them, where these
+/// are few the other digits. Empty where not even two of them lie on the axis.
 fn log_ticks((low, high): (f64, f64)) -> Vec<f64> {
     /// Ticks that make a scale, and that stand apart.
     const FEWEST: usize = 3;

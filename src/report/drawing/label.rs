@@ -36,8 +36,8 @@ impl Area {
         Area { x, px, up: (y.1 - y.0).signum() }
     }
 
-    /// Where the label of the line at `y` hides nothing that is drawn, or the least: its x, and how it hangs there. Places at the left
-    /// come first, the legend is at the right.
+    /// Where the label of the line at `y` hides nothing that is drawn, or the least: its x, and how it hangs there.
+    /// Places at the left come first, the legend is at the right.
     pub(super) fn free_place(&self, label: &str, y: f64, drawn: &[(f64, f64)]) -> (f64, Pos) {
         let wide = (label.chars().count() as f64 * LETTER * f64::from(LABEL_PX) + AROUND_PX) * self.px[0];
         let high = (1.3 * f64::from(LABEL_PX) + AROUND_PX) * self.px[1];

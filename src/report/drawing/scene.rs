@@ -1,7 +1,9 @@
-//! A view of things in space that is turned with the mouse, a finger or the arrow keys; without script it is a still picture.
+//! A view of things in space that is turned with the mouse, a finger or the arrow keys; without script it is a still
+//! picture.
 //!
-//! Everything is drawn as lines of an SVG in parallel projection. Each line carries its points, so that [`SCRIPT`](super::script::SCRIPT) can draw it again from
-//! another side. The view's own frame is a camera's: x right, y down, z away.
+//! Everything is drawn as lines of an SVG in parallel projection. Each line carries its points, so that
+//! [`SCRIPT`](super::script::SCRIPT) can draw it again from another side. The view's own frame is a camera's: x right,
+//! y down, z away.
 
 use std::fmt::Write as _;
 

@@ -21,7 +21,8 @@ use crate::measurements::Role;
 pub use self::screen::{summary, verified};
 
 /// The page. `before` and `after` are the errors of the verify rows under the nominal and the identified robot.
-/// `places` are the target's points in the nominal base frame, row by row; `arm` is the arm's line at the first centre pose.
+/// `places` are the target's points in the nominal base frame, row by row; `arm` is the arm's line at the first centre
+/// pose.
 pub fn page(
     set: &Dataset,
     record: &Record,

@@ -11,14 +11,15 @@ use crate::report::table::{Table, number};
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 use crate::robot::{Joint, Robot};
 
-/// Over less than this, deg, sine and cosine of an angle are a constant and a line to some per cent, and a link's terms are hardly told from a zero's.
+/// Over less than this, deg, sine and cosine of an angle are a constant and a line to some per cent, and a link's terms
+/// are hardly told from a zero's.
 const NARROW_DEG: f64 = 30.0;
 
 /// Half of a joint's limits where its file has none, deg.
 const HALF_A_TURN_DEG: f64 = 180.0;
 
-/// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written, and what to do with it.
-/// `robot` is the nominal robot with its file.
+/// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written,
+/// and what to do with it. `robot` is the nominal robot with its file.
 pub fn summary(
     record: &Record,
     (robot, nominal): (Option<&Utf8Path>, &Robot),
@@ -91,7 +92,8 @@ fn next(record: &Record, robot: &str, file: &str) -> String {
     }
 }
 
-/// How large a scale of the readings may hide; of a result that is not to be used there is nothing that it could be hidden in.
+/// How large a scale of the readings may hide; of a result that is not to be used there is nothing that it could be
+/// hidden in.
 pub(super) fn of_scale(record: &Record) -> Option<String> {
     let scale = record.scale.filter(|scale| !scale.is_significant() && record.advice != Advice::DoNotUse)?;
     Some(scale.sentence())

@@ -1,9 +1,10 @@
 //! Common arms from their makers' published tables.
 //!
-//! Angles are those of the maker's own zero position and signs, so that the numbers on the pendant are the readings. Classic tables
-//! (`T_i = Rz(q + theta) Tz(d) Tx(a) Rx(alpha)`) are kept as they are published and converted here: alpha and a move to the next
-//! joint's row, and those of the last row to the flange. Where a maker publishes a drawing instead of a table the rows follow from it.
-//! A robot file is a start: a machine's serial number decides about limits and options, so hold `robot show` against the pendant.
+//! Angles are those of the maker's own zero position and signs, so that the numbers on the pendant are the readings.
+//! Classic tables (`T_i = Rz(q + theta) Tz(d) Tx(a) Rx(alpha)`) are kept as they are published and converted here:
+//! alpha and a move to the next joint's row, and those of the last row to the flange. Where a maker publishes a drawing
+//! instead of a table the rows follow from it. A robot file is a start: a machine's serial number decides about limits
+//! and options, so hold `robot show` against the pendant.
 
 use super::arm::{Arm, Convention};
 use crate::robot::Robot;
@@ -231,7 +232,8 @@ mod tests {
         }
     }
 
-    /// The makers' signs: which way the flange goes when one joint turns by 10 degrees from zero (arms that stand upright there).
+    /// The makers' signs: which way the flange goes when one joint turns by 10 degrees from zero (arms that stand
+    /// upright there).
     #[test]
     fn joints_turn_the_way_that_their_maker_says() {
         for (name, joint, expected) in [

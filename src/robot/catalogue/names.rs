@@ -2,8 +2,8 @@
 
 use super::arms::{ARMS, PAPER};
 
-/// Names of the arms that may be meant: the one of exactly this name, or all whose name or title holds what was written, in any case,
-/// with any signs between letters and digits. A number is a whole one: 120 is not in 1200.
+/// Names of the arms that may be meant: the one of exactly this name, or all whose name or title holds what was
+/// written, in any case, with any signs between letters and digits. A number is a whole one: 120 is not in 1200.
 pub fn meant(written: &str) -> Vec<&'static str> {
     let known = || ARMS.iter().map(|arm| (arm.name, arm.title)).chain([(PAPER, "")]);
     let plain: String = written.to_ascii_lowercase().chars().filter(char::is_ascii_alphanumeric).collect();

@@ -1,8 +1,9 @@
 //! How much of each cell of a grid a polygon covers, exactly.
 //!
 //! In: closed outlines in the grid's own coordinates (cell `(i, j)` is the square from `(i, j)` to `(i + 1, j + 1)`).
-//! Out: covered area of each cell. Method: each piece of an outline inside one cell adds the area between itself and the
-//! cell's right side; a running sum along the row carries the rest (Green's theorem cell by cell). Nothing is sampled.
+//! Out: covered area of each cell. Method: each piece of an outline inside one cell adds the area between itself and
+//! the cell's right side; a running sum along the row carries the rest (Green's theorem cell by cell). Nothing is
+//! sampled.
 
 use nalgebra::Point2;
 

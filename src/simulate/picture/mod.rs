@@ -1,4 +1,5 @@
-//! One picture: what stands before the camera, what the lens and the sensor make of it, and what may go wrong with the file.
+//! One picture: what stands before the camera, what the lens and the sensor make of it, and what may go wrong with the
+//! file.
 //!
 //! In: a [`scene::Scene`]. Out: pixels ([`render::Renderer`]), and the true corners.
 

@@ -7,7 +7,8 @@ use nalgebra::{Point2, Point3};
 
 use crate::stereo::Camera;
 
-/// How far a straight piece may be from the curve it stands for, px: well under what the tests of the renderer see (1e-4 px).
+/// How far a straight piece may be from the curve it stands for, px: well under what the tests of the renderer see
+/// (1e-4 px).
 const SAGITTA_PX: f64 = 5e-5;
 
 /// Halvings of one edge at most; 1024 pieces bend any edge that crosses a picture.

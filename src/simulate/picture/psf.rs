@@ -35,7 +35,8 @@ impl Defocus {
     }
 }
 
-/// Weights of fine cells along one axis for one pixel: `weights[k]` belongs to cell `first + k`, counted from the pixel's first cell.
+/// Weights of fine cells along one axis for one pixel: `weights[k]` belongs to cell `first + k`, counted from the
+/// pixel's first cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Taps {
     /// Offset of the first cell; not positive.

@@ -2,8 +2,8 @@
 //!
 //! In: a [`Scene`]. Out: a [`Picture`]. Method: every shape's outline is projected through the lens; in tiles that an
 //! outline crosses, the exact area coverage of cells a quarter of a pixel wide is painted layer by layer, then spread
-//! and integrated over pixels ([`super::psf`]); tiles that no outline crosses show one surface. Light and sensor follow.
-//! Tiles are independent, so any order gives the same picture; memory is one picture of 16 bits.
+//! and integrated over pixels ([`super::psf`]); tiles that no outline crosses show one surface. Light and sensor
+//! follow. Tiles are independent, so any order gives the same picture; memory is one picture of 16 bits.
 
 use nalgebra::{Point2, Point3};
 
@@ -259,7 +259,8 @@ impl<'a> Renderer<'a> {
 }
 
 impl Scene<'_> {
-    /// Radius of the blur disc and the comatic flare of a point of the board's plane seen at a place in the picture, px.
+    /// Radius of the blur disc and the comatic flare of a point of the board's plane seen at a place in the picture,
+    /// px.
     pub fn spot_at(&self, px: &Point2<f64>) -> (f64, (f64, f64)) {
         let camera = &self.camera;
         let (dx, dy) = (px.x - camera.cx, px.y - camera.cy);

@@ -6,7 +6,8 @@ use crate::geometry::Transform;
 use crate::measurements::RobotPose;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 
-/// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty million.
+/// A change of the rig at one pose that lowers chi-square by more than this is none of chance: one pose in twenty
+/// million.
 pub(in crate::stereo::board_pose) const POSE_LIMIT: f64 = 45.0;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +20,8 @@ pub struct TargetPose {
     pub own_covariance: Matrix6<f64>,
     /// Derivative by the shared numbers, in the order of [`Shared::parameters`]: rotation (rad), then translation (mm).
     pub sensitivity: Matrix6xX<f64>,
-    /// Root mean square distance of the triangulated corners from the fitted target, mm; `None` where none is in use in both pictures.
+    /// Root mean square distance of the triangulated corners from the fitted target, mm; `None` where none is in use in
+    /// both pictures.
     pub fit_rms_mm: Option<f64>,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
@@ -29,7 +31,8 @@ pub struct TargetPose {
     pub outliers: usize,
     /// Reduced chi-square of the corners that were used.
     pub chi_square: f64,
-    /// How far `right_from_left` seems turned at this pose against all others, about x (epipolar residual), rad, and its sigma.
+    /// How far `right_from_left` seems turned at this pose against all others, about x (epipolar residual), rad, and
+    /// its sigma.
     pub pitch_rad: [f64; 2],
     /// The same about y: the residual of the target's size.
     pub yaw_rad: [f64; 2],

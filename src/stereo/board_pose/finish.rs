@@ -110,7 +110,8 @@ impl Finisher<'_> {
                 reason: format!("its corners miss the common rig and target {times:.1} times as far as at other poses"),
             });
         }
-        // As far as a pair went that the calibration used, but beyond chance: its own disagreement is what it is known to.
+        // As far as a pair went that the calibration used, but beyond chance: its own disagreement is what it is known
+        // to.
         let disagrees = change.map(|c| c.fall / own).filter(|fall| *fall > POSE_LIMIT);
         Ok(self.answer(i, alone, disagrees.map_or(1.0, |fall| fall / consistency::NUMBERS)))
     }
@@ -226,8 +227,8 @@ impl Finisher<'_> {
     }
 }
 
-/// Covariance of the shared unknowns, with what the target's rim, which no corner shows, leaves open: where corners are seen is known all the
-/// same, but not where the target's frame lies among them.
+/// Covariance of the shared unknowns, with what the target's rim, which no corner shows, leaves open: where corners are
+/// seen is known all the same, but not where the target's frame lies among them.
 fn with_rim(found: &Estimate<'_>) -> DMatrix<f64> {
     let bundle = &found.bundle;
     let modes = DMatrix::from_columns(&frame_modes(bundle.board));

@@ -1,8 +1,9 @@
 //! How far the pairs of a calibration scatter about its rig: what pictures of this rig do.
 //!
-//! In: a calibration. Out: how many times more than its corners' scatter allows the usual pair disagrees with the common rig, as a variance; what
-//! [`crate::stereo::board_pose::series`] finds of a run is compared with it. Pictures that were triggered have one, those of a board that is held by
-//! hand more. Method: Rao's score of a change of `right_from_left` at each pair, as for the poses of a run.
+//! In: a calibration. Out: how many times more than its corners' scatter allows the usual pair disagrees with the
+//! common rig, as a variance; what [`crate::stereo::board_pose::series`] finds of a run is compared with it. Pictures
+//! that were triggered have one, those of a board that is held by hand more. Method: Rao's score of a change of
+//! `right_from_left` at each pair, as for the poses of a run.
 
 use nalgebra::DMatrix;
 
@@ -24,7 +25,8 @@ pub fn pair_excess(calibration: &Calibration) -> f64 {
     beyond_chance(&changes(calibration).unwrap_or_default())
 }
 
-/// How far the pair disagrees that does most, of those that made the rig: the fall of chi-square by a change at it alone, over the usual excess.
+/// How far the pair disagrees that does most, of those that made the rig: the fall of chi-square by a change at it
+/// alone, over the usual excess.
 pub fn farthest_pair(calibration: &Calibration) -> Option<f64> {
     let each = changes(calibration)?;
     each.iter().flatten().map(|change| change.fall).max_by(f64::total_cmp).map(|fall| fall / beyond_chance(&each))
@@ -35,15 +37,17 @@ fn beyond_chance(each: &[Option<Change>]) -> f64 {
     Some(of_usual(each)).filter(|excess| *excess > chance).unwrap_or(1.0)
 }
 
-/// Beyond which a change at one pair or pose that lowers chi-square, over the usual excess, is no scatter of this rig: twice what the farthest pair did
-/// that the calibration used (the farthest of some is not the farthest of all), at least what chance does not.
+/// Beyond which a change at one pair or pose that lowers chi-square, over the usual excess, is no scatter of this rig:
+/// twice what the farthest pair did that the calibration used (the farthest of some is not the farthest of all), at
+/// least what chance does not.
 pub fn stray_limit(farthest_pair: Option<f64>) -> f64 {
     const BEYOND: f64 = 2.0;
     POSE_LIMIT.max(BEYOND * farthest_pair.unwrap_or(0.0))
 }
 
-/// The pairs that contradict a rig that they did not help to find, at the values of the problem: a change of `right_from_left` at the pair alone gains
-/// more than pairs of this rig are known to differ by. `rig` is the rig's covariance in the layout's order.
+/// The pairs that contradict a rig that they did not help to find, at the values of the problem: a change of
+/// `right_from_left` at the pair alone gains more than pairs of this rig are known to differ by. `rig` is the rig's
+/// covariance in the layout's order.
 pub fn strays(
     problem: &Problem,
     board: &Board,
@@ -57,8 +61,8 @@ pub fn strays(
     gains.iter().enumerate().filter_map(of_pair).collect()
 }
 
-/// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no better than their own
-/// change, so that it is free beside the change; the board's shape is held.
+/// What a change at each pair alone would gain. The rig was fitted to the same pairs, of which few determine it no
+/// better than their own change, so that it is free beside the change; the board's shape is held.
 fn changes(calibration: &Calibration) -> Option<Vec<Option<Change>>> {
     let Calibration { board, layout, values, priors, .. } = calibration;
     let known = priors.information(layout, &values.shared).matrix;
@@ -68,7 +72,8 @@ fn changes(calibration: &Calibration) -> Option<Vec<Option<Change>>> {
     })
 }
 
-/// What a change at each pair alone would gain, beside what the rig's covariance leaves; that may follow from what all pairs say of the rig.
+/// What a change at each pair alone would gain, beside what the rig's covariance leaves; that may follow from what all
+/// pairs say of the rig.
 fn gains(
     problem: &Problem,
     board: &Board,

@@ -1,11 +1,12 @@
 //! What the calibration board's own print does to the calibration.
 //!
-//! A crossing that is off its drawing is off in every pair, so that more pairs do not average it away; a bundle that takes every corner
-//! for independent says a covariance that is too small. In: a calibration's views and values. Out: how far the board's crossings
-//! deviate, and the covariance of the shared numbers with that in it. Method: the score of each crossing's place at the minimum, in
-//! units of what the corners say of it, exceeds chance by the print (a variance component by moments); the print then goes
-//! through the normal equations to the shared numbers. Windows see a part of each crossing's deviation and of its neighbours' (`window`):
-//! what is smooth over the board reaches the lens and the rig whole, though crossings are seen to scatter less than they do.
+//! A crossing that is off its drawing is off in every pair, so that more pairs do not average it away; a bundle that
+//! takes every corner for independent says a covariance that is too small. In: a calibration's views and values. Out:
+//! how far the board's crossings deviate, and the covariance of the shared numbers with that in it. Method: the score
+//! of each crossing's place at the minimum, in units of what the corners say of it, exceeds chance by the print (a
+//! variance component by moments); the print then goes through the normal equations to the shared numbers. Windows see
+//! a part of each crossing's deviation and of its neighbours' (`window`): what is smooth over the board reaches the
+//! lens and the rig whole, though crossings are seen to scatter less than they do.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Point3, Vector2, Vector3};
 
@@ -28,7 +29,8 @@ pub struct PrintShare {
     pub own_noise: Noise,
     /// Covariance of the shared numbers, in the layout's order: the corners' own noise and the print.
     pub covariance: DMatrix<f64>,
-    /// Variance of the shared numbers over what it were if all scatter were the corners' own, the mean over them; at least one.
+    /// Variance of the shared numbers over what it were if all scatter were the corners' own, the mean over them; at
+    /// least one.
     pub excess: f64,
 }
 
@@ -38,8 +40,8 @@ pub(super) fn rig_basis(layout: &Layout) -> DMatrix<f64> {
     DMatrix::from_fn(RIG_NUMBERS, numbers.len(), |number, column| f64::from(numbers[column] == number))
 }
 
-/// Sums over the pairs of a calibration, whose crossings are where its board's shape puts them; `each` gets every pair's parts. `basis`: see
-/// [`rig_basis`].
+/// Sums over the pairs of a calibration, whose crossings are where its board's shape puts them; `each` gets every
+/// pair's parts. `basis`: see [`rig_basis`].
 pub(super) fn totals_of_pairs(
     views: &[View],
     values: &Values,
@@ -72,7 +74,8 @@ pub fn print_share(solved: &Solved, board: &Board, layout: &Layout) -> Option<Pr
     told *= usual_variance(&seen);
     let numbers = 2.0 * in_use(views).count() as f64;
     let variance = print_variance(&totals, &seen, rig_count, told / numbers.max(1.0));
-    // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the refinement says.
+    // The difference of two large numbers where the print is most of it; but pixels scatter corners as much as the
+    // refinement says.
     let stated = noise.stated_share(views);
     let own_share = (1.0 - variance * told / numbers).max(stated);
     // The board's paraboloids are heights of its crossings.
@@ -102,8 +105,9 @@ fn usual_variance(seen: &[[SeenShares; 2]]) -> f64 {
     seen.iter().flatten().map(of).sum::<f64>() / (2 * seen.len()) as f64
 }
 
-/// A matrix with a column for each coordinate of each crossing, from `first` on and three a crossing, as columns for each independent
-/// deviation in the plane: those of the crossings, then those at the rim. `seen` is what windows see of them, for each crossing, in x and y.
+/// A matrix with a column for each coordinate of each crossing, from `first` on and three a crossing, as columns for
+/// each independent deviation in the plane: those of the crossings, then those at the rim. `seen` is what windows see
+/// of them, for each crossing, in x and y.
 fn by_deviations(matrix: &DMatrix<f64>, seen: &[[SeenShares; 2]], first: usize) -> Vec<DVector<f64>> {
     let mut columns = vec![DVector::zeros(matrix.nrows()); 2 * seen.len()];
     for (k, of_crossing) in seen.iter().enumerate() {
@@ -120,8 +124,8 @@ fn by_deviations(matrix: &DMatrix<f64>, seen: &[[SeenShares; 2]], first: usize) 
     columns
 }
 
-/// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it; `chance` is what the corners say of
-/// what is seen of their crossings, a number, the mean.
+/// Variance of a crossing's coordinate, mm^2. The expected sum of squared scores is a straight line in it; `chance` is
+/// what the corners say of what is seen of their crossings, a number, the mean.
 fn print_variance(totals: &Totals, seen: &[[SeenShares; 2]], rig_count: usize, chance: f64) -> f64 {
     let (mut scores, mut slope, mut count) = (0.0, 0.0, 0.0);
     let columns = by_deviations(&totals.matrix, seen, rig_count);

@@ -30,13 +30,16 @@ const TOGETHER: f64 = 0.2;
 /// Rounds of leaving poses out.
 const ROUNDS: usize = 8;
 
-/// Corners that the rig misses by more than this share of the picture's width belong to another rig, or to another target.
+/// Corners that the rig misses by more than this share of the picture's width belong to another rig, or to another
+/// target.
 const GROSS_SHARE: f64 = 1e-3;
 
-/// Corners that miss the rig this many times as far as usual are looked at in pictures that are exchanged or the other way round.
+/// Corners that miss the rig this many times as far as usual are looked at in pictures that are exchanged or the other
+/// way round.
 const UNUSUAL_MISFIT: f64 = 3.0;
 
-/// A size of the target is no cause where another place of the right camera leaves less than this share of what it leaves.
+/// A size of the target is no cause where another place of the right camera leaves less than this share of what it
+/// leaves.
 const BY_PLACE: f64 = 0.5;
 
 /// The pictures of one pose.
@@ -73,7 +76,8 @@ impl Knowledge {
     }
 }
 
-/// Of two poses with the same picture, the one whose pictures miss the rig by more than this many times what is usual has the other's.
+/// Of two poses with the same picture, the one whose pictures miss the rig by more than this many times what is usual
+/// has the other's.
 const TWIN_MISFIT: f64 = 10.0;
 
 pub(super) struct Run<'a> {
@@ -145,7 +149,8 @@ impl<'a> Run<'a> {
         Values { rig, deviations_mm: vec![Vector3::zeros(); self.known.board.corner_count()], poses }
     }
 
-    /// Faults so large that no pose can be measured: exchanged pictures, another size of squares, another unit of the baseline.
+    /// Faults so large that no pose can be measured: exchanged pictures, another size of squares, another unit of the
+    /// baseline.
     pub(super) fn gross(&self) -> Option<Judgement> {
         let limit = GROSS_SHARE * f64::from(self.known.rig.left.width);
         let misfit_px = self.misfit_px();
@@ -209,7 +214,8 @@ impl<'a> Run<'a> {
         PairCorners { pair: pair.pair.clone(), left, right }
     }
 
-    /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before it.
+    /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before
+    /// it.
     pub(super) fn consistent(&mut self) -> Option<Estimate<'a>> {
         for _ in 0..ROUNDS {
             let found = self.estimated()?;

@@ -1,8 +1,8 @@
 //! Where every pose's search begins: each pose by itself on the calibrated rig, and how its corners are numbered.
 //!
-//! A target that looks the same after a quarter or a half turn is numbered by the picture's direction; cameras that are rolled against each
-//! other make that wrong in one of them. The rig decides: of the numberings that the colours leave open, the right picture gets the one
-//! that fits it best.
+//! A target that looks the same after a quarter or a half turn is numbered by the picture's direction; cameras that are
+//! rolled against each other make that wrong in one of them. The rig decides: of the numberings that the colours leave
+//! open, the right picture gets the one that fits it best.
 
 use nalgebra::Vector2;
 use rayon::prelude::*;
@@ -64,8 +64,8 @@ pub(super) fn enough(view: &View) -> bool {
     Side::BOTH.iter().all(|side| view.active(*side).count() >= FEWEST_CORNERS)
 }
 
-/// Median over the poses of the length of `right_from_left` as each camera alone sees the target, over the calibrated one: what the
-/// target's size, or the baseline's unit, is off by.
+/// Median over the poses of the length of `right_from_left` as each camera alone sees the target, over the calibrated
+/// one: what the target's size, or the baseline's unit, is off by.
 pub(super) fn baseline_ratio(rig: &Rig, views: &[View]) -> Option<f64> {
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
     let ratio = |view: &View| {

@@ -1,8 +1,9 @@
 //! The numbering of a target that looks the same after a turn in its plane, from pose to pose.
 //!
-//! Neighbouring poses of a robot differ by less than such a turn: within a group every pose is numbered like the nearest one
-//! in the robot's joints, beginning at the group's centre. Where two numberings are nearly as good, that is said. What the numbering
-//! of one group is against another's (the camera was moved between them) the pictures alone do not tell.
+//! Neighbouring poses of a robot differ by less than such a turn: within a group every pose is numbered like the
+//! nearest one in the robot's joints, beginning at the group's centre. Where two numberings are nearly as good, that is
+//! said. What the numbering of one group is against another's (the camera was moved between them) the pictures alone do
+//! not tell.
 
 use crate::geometry::{Transform, rotation_vector};
 use crate::imaging::{Board, Side};

@@ -1,8 +1,8 @@
 //! How far corners scatter: the refinement's own covariances, corrected by what the residuals say.
 //!
-//! `Sigma_i = s C_i + tau^2 I`: `C_i` is the refinement's covariance (zero where it gave none), `tau` covers what it does not
-//! know (blur, print, lens), `s < 1` shrinks covariances that were too large. One of the two is fitted, so that the
-//! reduced chi-square is one; then the covariance of every result needs no further factor.
+//! `Sigma_i = s C_i + tau^2 I`: `C_i` is the refinement's covariance (zero where it gave none), `tau` covers what it
+//! does not know (blur, print, lens), `s < 1` shrinks covariances that were too large. One of the two is fitted, so
+//! that the reduced chi-square is one; then the covariance of every result needs no further factor.
 
 use nalgebra::{Matrix2, Vector2};
 
@@ -41,8 +41,8 @@ impl Noise {
         self.factor * in_use(views).map(stated).sum::<f64>() / in_use(views).count().max(1) as f64
     }
 
-    /// The noise of corners of whose variance only this share is their own: what was added gives way first. `stated` is the share of the
-    /// refinement's covariances.
+    /// The noise of corners of whose variance only this share is their own: what was added gives way first. `stated` is
+    /// the share of the refinement's covariances.
     pub fn of_share(&self, own: f64, stated: f64) -> Noise {
         if own < stated {
             return Noise { factor: self.factor * own / stated, added_px: 0.0, ..*self };
@@ -72,11 +72,12 @@ impl Noise {
         fit(residuals, |chi| chi.iter().sum::<f64>() / freedom)
     }
 
-    /// The likeliest noise with the loss that belongs to it, `unknowns` numbers being fitted to the same residuals: Gaussian, or Student's
-    /// distribution where its tails are more than chance (Bayes' criterion for one number more). Pictures that nobody triggered have
-    /// heavy tails, and some of their corners are simply wrong.
+    /// The likeliest noise with the loss that belongs to it, `unknowns` numbers being fitted to the same residuals:
+    /// Gaussian, or Student's distribution where its tails are more than chance (Bayes' criterion for one number more).
+    /// Pictures that nobody triggered have heavy tails, and some of their corners are simply wrong.
     pub fn likeliest(residuals: &[(Observation, Vector2<f64>)], unknowns: usize) -> (Noise, Loss) {
-        /// Degrees of freedom that are tried; with fewer the tails of a pair that moved would be taken for the corners'.
+        /// Degrees of freedom that are tried; with fewer the tails of a pair that moved would be taken for the
+        /// corners'.
         const FREEDOMS: [f64; 9] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 24.0, 36.0, 64.0];
         let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
         let with = |loss: Loss| {
@@ -108,10 +109,12 @@ impl Noise {
     }
 }
 
-/// The factor on the covariances after which the `reduced` chi-square of the corners is one; `first` is that with a factor of one.
+/// The factor on the covariances after which the `reduced` chi-square of the corners is one; `first` is that with a
+/// factor of one.
 fn shrunk(chi: &[f64], first: f64, reduced: &impl Fn(&mut [f64]) -> f64) -> f64 {
     let mut factor = first.max(f64::MIN_POSITIVE.sqrt());
-    // Where the reduced chi-square is a mean or a median, the first is right; weights that fall with chi-square need some rounds.
+    // Where the reduced chi-square is a mean or a median, the first is right; weights that fall with chi-square need
+    // some rounds.
     for _ in 0..100 {
         let ratio = reduced(&mut chi.iter().map(|c| c / factor).collect::<Vec<f64>>());
         if (ratio - 1.0).abs() < 1e-9 || !ratio.is_finite() || ratio <= 0.0 {
@@ -155,8 +158,9 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
         let factor = shrunk(&chi_squares(&aligned, 0.0), own, &reduced);
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
-    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse of the
-    // reduced chi-square is nearly a straight line in the added variance, which the secant follows; halving guards it.
+    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse
+    // of the reduced chi-square is nearly a straight line in the added variance, which the secant follows; halving
+    // guards it.
     let (mut low, mut high) = (0.0, plain);
     let miss = |added: f64| 1.0 / with(added) - 1.0;
     let (mut at_low, mut at_high) = (own.map_or(-1.0, |own| 1.0 / own - 1.0), miss(plain));

@@ -1,9 +1,9 @@
 //! How the residuals of neighbouring corners hang together, and what that does to standard deviations.
 //!
-//! A corner fit whose window reaches along the edges to the next corners uses each piece of edge twice: both its
-//! ends move with the same noise across that edge, and not along it. Two windows that overlap wholly correlate by one half.
-//! A lens, a board or light that the model lacks moves neighbours together in both directions. So the correlation along the
-//! joining edge tells what the model lacks, and what the one across has more is overlap.
+//! A corner fit whose window reaches along the edges to the next corners uses each piece of edge twice: both its ends
+//! move with the same noise across that edge, and not along it. Two windows that overlap wholly correlate by one half.
+//! A lens, a board or light that the model lacks moves neighbours together in both directions. So the correlation along
+//! the joining edge tells what the model lacks, and what the one across has more is overlap.
 //!
 //! Corners that share information are worth less than as many independent ones: the covariance of anything that
 //! depends smoothly on the corners is larger by `1 + sum of the correlations with all neighbours`.
@@ -51,8 +51,9 @@ impl NeighbourCorrelation {
         sums.finish()
     }
 
-    /// Factor on the covariance of what depends smoothly on the corners; one where no overlap shows. A fault of the model moves neighbours
-    /// together across the edge as well and cannot be told from overlap there: the factor then is that of a whole overlap, never less.
+    /// Factor on the covariance of what depends smoothly on the corners; one where no overlap shows. A fault of the
+    /// model moves neighbours together across the edge as well and cannot be told from overlap there: the factor then
+    /// is that of a whole overlap, never less.
     pub fn inflation(&self) -> f64 {
         let sure = self.across > SURE * self.standard_error;
         if sure { 1.0 + self.across.min(WHOLE_OVERLAP) * self.links_per_corner } else { 1.0 }

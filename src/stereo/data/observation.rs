@@ -20,8 +20,8 @@ pub struct Observation {
     pub px: Point2<f64>,
     /// The refinement's own covariance, px^2; zero where it gave none.
     pub covariance_px2: Matrix2<f64>,
-    /// How far the corner's window reaches along the edges that run along the rows and along the columns, as a share of a square's side;
-    /// zero where nothing is known of it.
+    /// How far the corner's window reaches along the edges that run along the rows and along the columns, as a share of
+    /// a square's side; zero where nothing is known of it.
     pub reach: [f64; 2],
     /// By how much what the window sees lies off the crossing itself, on the board, mm.
     pub seen_off_mm: Vector3<f64>,

@@ -17,8 +17,8 @@ pub struct View {
 }
 
 impl View {
-    /// The corners of a pair: those that imaging relies on, or, in a picture with fewer than `fewest` of them, all that it found.
-    /// A whole picture out of focus is judged by how it fits, with the covariances it has.
+    /// The corners of a pair: those that imaging relies on, or, in a picture with fewer than `fewest` of them, all that
+    /// it found. A whole picture out of focus is judged by how it fits, with the covariances it has.
     pub fn new(board: &Board, corners: &PairCorners, fewest: usize) -> View {
         let of = |side, list: &[Corner]| -> Vec<Observation> {
             let inside =
@@ -56,8 +56,8 @@ impl View {
         self.turn(board, Side::Right, quarters);
     }
 
-    /// Renumbers a picture's corners as on a board that is turned in its plane by so many quarter turns. A board with unequal
-    /// sides takes half turns only.
+    /// Renumbers a picture's corners as on a board that is turned in its plane by so many quarter turns. A board with
+    /// unequal sides takes half turns only.
     pub fn turn(&mut self, board: &Board, side: Side, quarters: usize) {
         for o in self.observations.iter_mut().filter(|o| o.side == side) {
             o.renumber(board, board.turned((o.col, o.row), quarters));

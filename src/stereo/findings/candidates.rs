@@ -1,9 +1,10 @@
 //! What may explain a change over the series, and which of it does.
 //!
-//! In: the pairs as a linear problem, and which share of the change each has. Out: what is not told apart from what explains most, that first. Method: each
-//! candidate frees its numbers; its likelihood, less what its numbers cost, is compared. A cause of one number that does as well as more of them is
-//! what happened. A lens that is focused moves its picture as well, which one number does not say; that looks much like a camera that turned, and is
-//! told where the focal length itself is needed. Goes wrong: a camera that moved and was focused at once.
+//! In: the pairs as a linear problem, and which share of the change each has. Out: what is not told apart from what
+//! explains most, that first. Method: each candidate frees its numbers; its likelihood, less what its numbers cost, is
+//! compared. A cause of one number that does as well as more of them is what happened. A lens that is focused moves its
+//! picture as well, which one number does not say; that looks much like a camera that turned, and is told where the
+//! focal length itself is needed. Goes wrong: a camera that moved and was focused at once.
 
 use nalgebra::DVector;
 

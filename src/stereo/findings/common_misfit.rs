@@ -1,12 +1,13 @@
 //! Why all pairs of a series miss their rig by more than their corners let expect.
 //!
-//! In: a calibration from all pairs, and what changed over them. Out: the cause that they share: a board whose squares are not as wide and high as
-//! was said, or else, where they miss their rig by several times what each camera leaves of its own pictures, pictures that were
-//! not taken at one moment; where they miss it by less, only if another place of the right camera for each pair takes away half of the misfit, and goes
-//! neither with where the board stood, as what a lens or a board lacks does, nor with a focus. Method: one camera alone takes up much of a
-//! board that is too wide in the place that it gives it, two cameras cannot; the ratio of width and height that the pairs ask for is looked for, all
-//! poses and the rig solved again, and it is the cause where the misfit goes with it. The size of the squares itself no pictures tell. Goes wrong:
-//! both at once are told as the one that explains more.
+//! In: a calibration from all pairs, and what changed over them. Out: the cause that they share: a board whose squares
+//! are not as wide and high as was said, or else, where they miss their rig by several times what each camera leaves of
+//! its own pictures, pictures that were not taken at one moment; where they miss it by less, only if another place of
+//! the right camera for each pair takes away half of the misfit, and goes neither with where the board stood, as what a
+//! lens or a board lacks does, nor with a focus. Method: one camera alone takes up much of a board that is too wide in
+//! the place that it gives it, two cameras cannot; the ratio of width and height that the pairs ask for is looked for,
+//! all poses and the rig solved again, and it is the cause where the misfit goes with it. The size of the squares
+//! itself no pictures tell. Goes wrong: both at once are told as the one that explains more.
 
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -30,18 +31,20 @@ use crate::stereo::solve::{Priors, Problem};
 /// Pairs that are named as the worst.
 const WORST: usize = 5;
 
-/// How many times what corners scatter by pairs miss their rig by at least where something moved between their pictures.
+/// How many times what corners scatter by pairs miss their rig by at least where something moved between their
+/// pictures.
 const BESIDE_CORNERS: f64 = 2.0;
 
-/// Change of the board's ratio of width and height by which the equations are asked what it would gain: far below what moves a corner by a pixel.
+/// Change of the board's ratio of width and height by which the equations are asked what it would gain: far below what
+/// moves a corner by a pixel.
 const SMALL: f64 = 1e-4;
 
 /// Rounds after which the ratio stands still to [`STILL`], from a tenth of the board.
 const MOST_ROUNDS: usize = 6;
 const STILL: f64 = 1e-7;
 
-/// Most of the misfit that a board may leave where pictures that were not taken at one moment would explain all of it. One number of sixteen that a
-/// rig has takes up little of what has another cause.
+/// Most of the misfit that a board may leave where pictures that were not taken at one moment would explain all of it.
+/// One number of sixteen that a rig has takes up little of what has another cause.
 const BESIDE_LATE: f64 = 0.5;
 
 /// Chance with which what pairs miss their rig by for another reason may look like a board's sides.
@@ -66,8 +69,8 @@ pub fn look(calibration: &Calibration, changes: &[Finding]) -> Option<Finding> {
         .or_else(|| is_late.then(|| not_simultaneous(calibration, misfit)))
 }
 
-/// Whether something that moved between the two pictures of each pair is why these miss their rig by more than each camera misses its own pictures, and
-/// nothing else explains it. Too few pairs do not tell.
+/// Whether something that moved between the two pictures of each pair is why these miss their rig by more than each
+/// camera misses its own pictures, and nothing else explains it. Too few pairs do not tell.
 fn each_moved(calibration: &Calibration, misfit: &Misfit) -> bool {
     let (views, shared) = (&calibration.views, &calibration.values.shared);
     let apart = |view: &View| times_alone(shared, view, calibration.alone_px, as_two_boards);
@@ -155,8 +158,8 @@ fn left_px(shared: &Shared, view: &View) -> f64 {
     misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px)
 }
 
-/// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares, and those move the corners by more
-/// than these scatter; `most` is the share of the misfit that may be left.
+/// A board whose squares are not as wide and high as was said, where the pairs fit one rig with other squares, and
+/// those move the corners by more than these scatter; `most` is the share of the misfit that may be left.
 fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64, most: f64) -> Option<Finding> {
     // What corners scatter by leaves nothing to explain.
     if misfit.usual_px < std::f64::consts::SQRT_2 * corner_sigma_px {
@@ -206,8 +209,9 @@ fn other_sides(calibration: &Calibration, misfit: &Misfit, corner_sigma_px: f64,
     })
 }
 
-/// By how much wider the board is than was said, for its height, and the pairs with that board. `None` where the pairs do not tell, or where it
-/// explains too little of what they miss the rig by to be the cause. Method: Gauss-Newton with the rig and the poses eliminated.
+/// By how much wider the board is than was said, for its height, and the pairs with that board. `None` where the pairs
+/// do not tell, or where it explains too little of what they miss the rig by to be the cause. Method: Gauss-Newton with
+/// the rig and the poses eliminated.
 fn likeliest_stretch(problem: &Problem, layout: &Layout) -> Option<(f64, Problem)> {
     /// Share of chi-squared that a cause takes away at least.
     const LEAST: f64 = 0.25;

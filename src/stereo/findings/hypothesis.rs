@@ -39,7 +39,8 @@ pub fn all(layout: &Layout, rig: &Rig) -> Vec<Hypothesis> {
     ]
 }
 
-/// The right camera turns about its own centre, by a rotation vector, rad: points in its frame turn, and with them the translation.
+/// The right camera turns about its own centre, by a rotation vector, rad: points in its frame turn, and with them the
+/// translation.
 pub fn turned(layout: &Layout, rig: &Rig, about: Vector3<f64>) -> DVector<f64> {
     let mut direction = moved(layout, about.cross(&rig.right_from_left.translation.vector));
     direction.rows_mut(layout.transform_start(), 3).copy_from(&about);

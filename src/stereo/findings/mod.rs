@@ -1,10 +1,11 @@
 //! What happened to a rig while it was photographed: steps and drifts over the pairs, and what they do to a length.
 //!
-//! In: a calibration from all pairs, and lengths through the volume that it is for. Out: the changes that are more than the pairs' own scatter
-//! makes of nothing, each with its cause, or the causes that are not told apart, and its effect. Method: every cause at every place of
-//! the series in one linear problem ([`series`]), an F test against the scatter that the pairs have with the change taken out, every look
-//! counted. The largest finding is taken out and the rest is looked at again. What is done about a finding follows from its effect and
-//! not from how surely it is seen ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
+//! In: a calibration from all pairs, and lengths through the volume that it is for. Out: the changes that are more than
+//! the pairs' own scatter makes of nothing, each with its cause, or the causes that are not told apart, and its effect.
+//! Method: every cause at every place of the series in one linear problem ([`series`]), an F test against the scatter
+//! that the pairs have with the change taken out, every look counted. The largest finding is taken out and the rest is
+//! looked at again. What is done about a finding follows from its effect and not from how surely it is seen
+//! ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
 
 mod candidates;
 pub mod common_misfit;
@@ -41,7 +42,8 @@ const FALSE_ALARM: f64 = 1e-3;
 /// Fewest pairs on either side of a step: one pair that differs is no change of the rig.
 const FEWEST_EACH: usize = 2;
 
-/// Fewest pairs whose order can be exchanged often enough, how often it is, and in how many of a hundred orders so large a change may be found.
+/// Fewest pairs whose order can be exchanged often enough, how often it is, and in how many of a hundred orders so
+/// large a change may be found.
 const PERMUTED_FROM: usize = 12;
 const PERMUTATIONS: usize = 400;
 
@@ -124,8 +126,9 @@ impl Along {
         &self.whole * share - &self.common
     }
 
-    /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that step; `noise` is the variance of
-    /// the corners without the change over the one that they were weighed by, at which the pairs scatter at least.
+    /// Standard deviation of the step from the rig that is taken to the one with a share of the change, along that
+    /// step; `noise` is the variance of the corners without the change over the one that they were weighed by, at which
+    /// the pairs scatter at least.
     pub fn sigma_of(&self, share: f64, noise: f64) -> DVector<f64> {
         self.to(share) * (self.scatter.max(noise) / self.gain).sqrt()
     }
@@ -149,7 +152,8 @@ pub fn of_lenses(calibration: &Calibration, lengths: &VolumeLengths) -> Option<F
     })
 }
 
-/// What happened to single pairs that are not used, a finding for each cause or causes that are not told apart; pairs without a board or shown twice are none.
+/// What happened to single pairs that are not used, a finding for each cause or causes that are not told apart; pairs
+/// without a board or shown twice are none.
 pub fn of_pairs(discarded: &[DiscardedPair]) -> Vec<Finding> {
     let mut found: Vec<Finding> = Vec::new();
     for pair in discarded.iter().filter(|pair| pair.cause.contradicts()) {
@@ -198,8 +202,9 @@ struct WithoutOne {
     causes: Vec<Cause>,
 }
 
-/// The first pair that alone decides what a change is: without it the likeliest cause is none of these. The pair that misses the rig most is taken out of the
-/// bundle itself, too: with it goes what it adds to the scatter that the others are weighed by, which the linear problem does not see.
+/// The first pair that alone decides what a change is: without it the likeliest cause is none of these. The pair that
+/// misses the rig most is taken out of the bundle itself, too: with it goes what it adds to the scatter that the others
+/// are weighed by, which the linear problem does not see.
 fn without_one(
     problem: &Problem,
     linear: &Linear,
@@ -227,8 +232,8 @@ fn without_one(
     })
 }
 
-/// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause by the F test, and, where
-/// there are pairs enough, against the same pairs in another order.
+/// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause
+/// by the F test, and, where there are pairs enough, against the same pairs in another order.
 fn significant(linear: &Linear, hypotheses: &[Hypothesis]) -> Option<Pattern> {
     let count = linear.pairs();
     let step = |first: usize| Pattern {
@@ -320,8 +325,9 @@ fn finding(
     })
 }
 
-/// What to do about a change of the rig, for a person who photographs again: hold what changed. `causes` are words with `|` between them; `since` are the pairs after the last change of a rig that went on
-/// changing, where they are enough for a rig. `None` where no hold helps.
+/// What to do about a change of the rig, for a person who photographs again: hold what changed. `causes` are words with
+/// `|` between them; `since` are the pairs after the last change of a rig that went on changing, where they are enough
+/// for a rig. `None` where no hold helps.
 pub(super) fn hold(causes: &str, since: Option<&[String]>) -> Option<String> {
     let is = |of: &[Cause]| causes.split('|').any(|word| of.iter().any(|cause| cause.word() == word));
     let unknown = is(&[Cause::Unknown]);

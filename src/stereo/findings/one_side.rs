@@ -1,9 +1,9 @@
 //! Pairs of which none fits: did something happen to all pictures of one side?
 //!
-//! A picture that failed on one side, in series that are paired by their order or their numbers, gives every later picture the partner of
-//! another moment; a program mirrors or inverts what it saves of one camera. In: corners of pairs that contradict each other. Out: what, undone in
-//! the right pictures, makes most of the pairs fit one rig. Method: calibration of each way. Goes wrong: a picture that failed in the middle, which
-//! is a shift of a part.
+//! A picture that failed on one side, in series that are paired by their order or their numbers, gives every later
+//! picture the partner of another moment; a program mirrors or inverts what it saves of one camera. In: corners of
+//! pairs that contradict each other. Out: what, undone in the right pictures, makes most of the pairs fit one rig.
+//! Method: calibration of each way. Goes wrong: a picture that failed in the middle, which is a shift of a part.
 
 use crate::imaging::input::pairs::natural_order;
 use crate::imaging::{Corner, Corners, PairCorners};
@@ -16,8 +16,8 @@ const TRIED: [isize; 4] = [1, -1, 2, -2];
 /// Share of the pairs that must fit one rig then.
 const MOST: f64 = 0.8;
 
-/// The error of pairs that contradict each other, or that of what happened to one side where that explains it. `fitting` counts the pairs that
-/// fit one rig.
+/// The error of pairs that contradict each other, or that of what happened to one side where that explains it.
+/// `fitting` counts the pairs that fit one rig.
 pub fn explain(error: Error, corners: &Corners, fitting: impl Fn(&Corners) -> Option<usize>) -> Error {
     if !matches!(error, Error::Contradiction { .. }) {
         return error;
@@ -50,7 +50,8 @@ pub fn explain(error: Error, corners: &Corners, fitting: impl Fn(&Corners) -> Op
         .unwrap_or(error)
 }
 
-/// Each pair whose left picture is taken, with that whose right one is, so many pairs later; pairs in which no board was found count.
+/// Each pair whose left picture is taken, with that whose right one is, so many pairs later; pairs in which no board
+/// was found count.
 fn partners(corners: &Corners, by: isize) -> Vec<(&PairCorners, &PairCorners)> {
     let mut names: Vec<&str> = corners.skipped.iter().map(|pair| pair.pair.as_str()).collect();
     names.extend(corners.pairs.iter().map(|pair| pair.pair.as_str()));

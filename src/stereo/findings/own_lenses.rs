@@ -1,8 +1,9 @@
 //! The pairs with the lenses that they give themselves, where they contradict those that were known.
 //!
-//! In: a calibration with known lenses. Out: the same with lenses of its own. Wrong lenses make pairs miss their rig as pictures of two moments, rows
-//! that were read out late or another board do: what else is the matter is asked of the pairs without them. Goes wrong: so few pairs that other lenses
-//! take up what has another cause; it shows as soon as the lenses are right.
+//! In: a calibration with known lenses. Out: the same with lenses of its own. Wrong lenses make pairs miss their rig as
+//! pictures of two moments, rows that were read out late or another board do: what else is the matter is asked of the
+//! pairs without them. Goes wrong: so few pairs that other lenses take up what has another cause; it shows as soon as
+//! the lenses are right.
 
 use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;

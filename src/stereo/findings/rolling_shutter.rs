@@ -1,11 +1,14 @@
-//! Rows that were not taken at one moment: a board that moved in all pairs in one direction while its pictures were read out.
+//! Rows that were not taken at one moment: a board that moved in all pairs in one direction while its pictures were
+//! read out.
 //!
-//! In: a calibration. Out: the motion that all pairs have in common, and what it does to a length. A rolling shutter takes the rows of a picture one
-//! after the other: a board that moves meanwhile is seen higher, sheared, or larger towards its end. At one distance a lens does the same whose
-//! focal lengths along x and y differ, but a nearer board is displaced farther, and that no lens does. Method: the way of the board as three
-//! numbers beyond those of the rig ([`Linear`]), an F test against the pairs' scatter, and the likelihood against what leaves much the same in
-//! pictures: a board that is sheared or too wide, sensors that are skew or tilted. Goes wrong: boards that are all equally far away tell nothing, nor do
-//! pairs that miss the rig so far that each camera alone tells its lens: the motion is in that.
+//! In: a calibration. Out: the motion that all pairs have in common, and what it does to a length. A rolling shutter
+//! takes the rows of a picture one after the other: a board that moves meanwhile is seen higher, sheared, or larger
+//! towards its end. At one distance a lens does the same whose focal lengths along x and y differ, but a nearer board
+//! is displaced farther, and that no lens does. Method: the way of the board as three numbers beyond those of the rig
+//! ([`Linear`]), an F test against the pairs' scatter, and the likelihood against what leaves much the same in
+//! pictures: a board that is sheared or too wide, sensors that are skew or tilted. Goes wrong: boards that are all
+//! equally far away tell nothing, nor do pairs that miss the rig so far that each camera alone tells its lens: the
+//! motion is in that.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -24,19 +27,20 @@ use crate::stereo::solve::Loss;
 use crate::stereo::solve::normal_equations::{self, Block, Way};
 use crate::stereo::volume::lengths::VolumeLengths;
 
-/// Probability of five standard deviations: what a lens lacks is alike in all pairs, so that their scatter says nothing of it, and makes a little of such a
-/// motion out of nothing.
+/// Probability of five standard deviations: what a lens lacks is alike in all pairs, so that their scatter says nothing
+/// of it, and makes a little of such a motion out of nothing.
 const CHANCE: f64 = 5.7e-7;
 
-/// Numbers beyond the rig's: the board's way while a picture is read out along x, y and z, mm; its own width against its height and its shear; each
-/// sensor's skew and tilt towards its rows.
+/// Numbers beyond the rig's: the board's way while a picture is read out along x, y and z, mm; its own width against
+/// its height and its shear; each sensor's skew and tilt towards its rows.
 const NUMBERS: usize = 9;
 const WAY: std::ops::Range<usize> = 0..3;
 
 /// What else leaves much the same as the board's way does.
 const OTHERS: [std::ops::Range<usize>; 2] = [3..5, 5..NUMBERS];
 
-/// The motion that the pairs share, where there is one, and the step from the rig that is calibrated to the one without it.
+/// The motion that the pairs share, where there is one, and the step from the rig that is calibrated to the one without
+/// it.
 pub fn look(
     calibration: &Calibration,
     lengths: impl Fn(&Calibration) -> VolumeLengths,
@@ -92,7 +96,8 @@ fn finding(calibration: &Calibration, way_mm: &Vector3<f64>, effect_mm: f64) -> 
     }
 }
 
-/// A pair's share of the normal equations with the numbers beyond the rig's behind the shared ones. `None` where a corner lies behind its camera.
+/// A pair's share of the normal equations with the numbers beyond the rig's behind the shared ones. `None` where a
+/// corner lies behind its camera.
 fn extended((shared, layout): (&Shared, &Layout), block: Block, view: &View, pose: &Transform) -> Option<Block> {
     let known = block.shared_gradient.len();
     let size = known + NUMBERS;

@@ -1,10 +1,11 @@
 //! The pairs of a calibration as a linear problem: what a change of the rig along the series would gain.
 //!
-//! In: a problem at its minimum. Out: for any change of the shared numbers that grows along the series by a pattern, how large it is and what it
-//! gains, all shared numbers and poses solved again. Method: each pair's share of the normal equations at the minimum; a change is a few columns
-//! more, solved in one elimination. Where a pair's residual depends on where its board stood (a lens that lacks something), that would look
-//! like a change wherever the board was moved in one direction: whether a change is there at all is asked with the same change as a
-//! function of the board's place as a nuisance. Its scatter is that of the pairs after the change was taken out: what all pairs do.
+//! In: a problem at its minimum. Out: for any change of the shared numbers that grows along the series by a pattern,
+//! how large it is and what it gains, all shared numbers and poses solved again. Method: each pair's share of the
+//! normal equations at the minimum; a change is a few columns more, solved in one elimination. Where a pair's residual
+//! depends on where its board stood (a lens that lacks something), that would look like a change wherever the board was
+//! moved in one direction: whether a change is there at all is asked with the same change as a function of the board's
+//! place as a nuisance. Its scatter is that of the pairs after the change was taken out: what all pairs do.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,12 +23,13 @@ pub const PLACES_FROM: usize = 12;
 pub struct Change {
     /// In each of its directions, in units of them.
     pub amounts: DVector<f64>,
-    /// What all pairs share takes up of it, so that the rig of a pair is the common one, this less, and its own part of the change.
+    /// What all pairs share takes up of it, so that the rig of a pair is the common one, this less, and its own part of
+    /// the change.
     pub common: DVector<f64>,
     /// By how much chi-squared falls.
     pub gain: f64,
-    /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect: below one where what the corners are
-    /// said to scatter by has the change in it.
+    /// Variance of the pairs' residuals about the rig, with the change, over what their corners let expect: below one
+    /// where what the corners are said to scatter by has the change in it.
     pub scatter: f64,
 }
 
@@ -44,8 +46,8 @@ pub struct Line {
 }
 
 impl Line {
-    /// F of a pattern: what it gains over the pairs' scatter with it taken out, and the degrees of freedom of that scatter. Zero where the
-    /// pairs do not determine it.
+    /// F of a pattern: what it gains over the pairs' scatter with it taken out, and the degrees of freedom of that
+    /// scatter. Zero where the pairs do not determine it.
     pub fn f(&self, pattern: &DVector<f64>) -> (f64, f64) {
         let n = pattern.len();
         let columns: Vec<&DVector<f64>> = std::iter::once(pattern).chain(&self.places).collect();
@@ -80,8 +82,8 @@ impl Linear {
         Linear::of(&equations.blocks, &equations.prior.matrix, problem)
     }
 
-    /// The same from the pairs' shares of the normal equations, which may have numbers beyond the shared ones: those are zero but for a change. `prior`
-    /// is what is expected of the shared ones.
+    /// The same from the pairs' shares of the normal equations, which may have numbers beyond the shared ones: those
+    /// are zero but for a change. `prior` is what is expected of the shared ones.
     pub fn of(blocks: &[Block], prior: &DMatrix<f64>, problem: &Problem) -> Option<Linear> {
         let reduced = blocks.iter().map(|block| block.reduced(0.0)).collect::<Option<Vec<_>>>()?;
         let (matrices, gradients): (Vec<DMatrix<f64>>, Vec<_>) = reduced.into_iter().unzip();
@@ -137,7 +139,8 @@ impl Linear {
         Line { form, gradient, own, places }
     }
 
-    /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not determine it.
+    /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not
+    /// determine it.
     pub fn change(&self, directions: &[DVector<f64>], pattern: &[f64]) -> Option<Change> {
         let (n, all) = (self.pairs(), directions.len());
         // Each direction's slope of the gradient, summed over the pairs, and what the shared numbers do about it.
@@ -161,8 +164,9 @@ impl Linear {
         (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, common, gain, scatter })
     }
 
-    /// By how much chi-squared falls where each pair has a change of its own along these directions, a number of freedom; with `places` beside what goes
-    /// with where the board stood, which then is no pair's own. Pairs far off count like those that are usual. `None` where the pairs do not determine it.
+    /// By how much chi-squared falls where each pair has a change of its own along these directions, a number of
+    /// freedom; with `places` beside what goes with where the board stood, which then is no pair's own. Pairs far off
+    /// count like those that are usual. `None` where the pairs do not determine it.
     pub fn gain_of_each(&self, directions: &[DVector<f64>], places: bool) -> Option<f64> {
         /// Pairs whose change gains so many times what changes usually do are far off.
         const FAR: f64 = 9.0;

@@ -1,10 +1,11 @@
 //! Which rig is calibrated where it changed while it was photographed: the one that stands now.
 //!
-//! In: the corners of all pairs. Out: a calibration with what was found over the series, and whether its last pairs confirm it. Method: all pairs
-//! make one rig. A step changes that only where it moves a length by more than a share of the tolerance, and where enough pairs since then
-//! make a rig that is surer than the one of all with the step in its uncertainty. A step that stays in is part of the uncertainty, a bias known
-//! to its own size (GUM, F.2.4.5). Of a rig that drifts the middle of the series is known best: the rig is that one, and what it drifted
-//! since then goes into what is measured later.
+//! In: the corners of all pairs. Out: a calibration with what was found over the series, and whether its last pairs
+//! confirm it. Method: all pairs make one rig. A step changes that only where it moves a length by more than a share of
+//! the tolerance, and where enough pairs since then make a rig that is surer than the one of all with the step in its
+//! uncertainty. A step that stays in is part of the uncertainty, a bias known to its own size (GUM, F.2.4.5). Of a rig
+//! that drifts the middle of the series is known best: the rig is that one, and what it drifted since then goes into
+//! what is measured later.
 
 use nalgebra::DVector;
 
@@ -78,8 +79,9 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
     }
 }
 
-/// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig by more than each camera
-/// misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and looks like something that moved between the two.
+/// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig
+/// by more than each camera misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and
+/// looks like something that moved between the two.
 fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
     let found = calibrate_by(corners, &asked.options, true, true).ok().filter(|found| found.runs == 0)?;
     let change = change(&found, asked).filter(|change| change.kind == Kind::Drift)?;
@@ -103,7 +105,8 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
     (found, told)
 }
 
-/// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it was found.
+/// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it
+/// was found.
 fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
     let mut found = calibrate(corners, &asked.options)?;
     let first = first_run(&found, corners, told.as_ref());
@@ -137,7 +140,8 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     Ok((found, findings))
 }
 
-/// The first pairs, two or more, where they contradict the others and are of one other rig; `told` is a step that was found.
+/// The first pairs, two or more, where they contradict the others and are of one other rig; `told` is a step that was
+/// found.
 fn first_run(found: &Calibration, corners: &Corners, told: Option<&Finding>) -> Option<Vec<String>> {
     let before: Vec<&PairCorners> = corners.pairs.iter().take_while(|pair| is_of_another_rig(found, pair)).collect();
     let is_step = told.is_some_and(|told| told.is_step_to(&found.pair_names()));
@@ -165,7 +169,8 @@ fn names(pairs: &[&PairCorners]) -> Vec<String> {
     pairs.iter().map(|pair| pair.pair.clone()).collect()
 }
 
-/// The step to these pairs, as it was found, or as far as it is known: a rig that fits so badly to the other that none fits both.
+/// The step to these pairs, as it was found, or as far as it is known: a rig that fits so badly to the other that none
+/// fits both.
 fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
     told.filter(|told| told.is_step_to(&pairs)).unwrap_or_else(|| {
         let first = pairs.first().map_or("", String::as_str);
@@ -249,8 +254,9 @@ struct Later {
     change: Option<Finding>,
 }
 
-/// The rig of the pairs since a step, where these are enough, it is surer than the one of all, and it stands: of a rig that goes on changing (a
-/// focus that hunts) no part is the one that stands, and all pairs together say best what it does.
+/// The rig of the pairs since a step, where these are enough, it is surer than the one of all, and it stands: of a rig
+/// that goes on changing (a focus that hunts) no part is the one that stands, and all pairs together say best what it
+/// does.
 fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Finding) -> Option<Later> {
     if change.kind != Kind::Step
         || !change.material(asked.tolerance_mm)
@@ -286,8 +292,9 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })
 }
 
-/// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted since then is told beside
-/// it; a step is part of the uncertainty. Where the last pairs are those of another rig, that is said.
+/// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted
+/// since then is told beside it; a step is part of the uncertainty. Where the last pairs are those of another rig, that
+/// is said.
 fn stays(found: &mut Calibration, change: &mut Finding, asked: &Asked, corners: &Corners) {
     let board_may_grow = change.may_be(Cause::OtherBoard);
     if let Some(along) = &mut change.along {

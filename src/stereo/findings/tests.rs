@@ -172,7 +172,8 @@ fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
         assert!(off.abs() < limit, "{size_deg} deg in world {w}: {off} against {limit}");
         let since = found.since_moment[0][at];
         assert!((since - 0.5 * size_deg.to_radians()).abs() < limit, "{since} against {limit}");
-        // What drifted is known, and counts as no scatter of the pairs; of a board that may have grown it is not known where it began.
+        // What drifted is known, and counts as no scatter of the pairs; of a board that may have grown it is not known
+        // where it began.
         let still = standing(&world.corners(22)).0;
         for (at, most) in [(0, most_focal), (at, 1.6)] {
             let [sigma, still] = [&found, &still].map(|found| found.covariance[(at, at)].sqrt());

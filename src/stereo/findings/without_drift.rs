@@ -1,9 +1,10 @@
 //! The rig of one moment of a series over which it drifted, as if it had stood still.
 //!
-//! In: a calibration from all pairs, their corners, and the drift that was found. Out: the calibration of the same corners, each moved by what
-//! the drift did to it since that moment. Without this the drift would count as scatter of the pairs, although it is known, and the rig's covariance
-//! would be several times too large. The corners of the result are those that were seen: what is held out is not smoothed by the
-//! finding. Goes wrong: pairs that are chosen otherwise without the drift; then there is no result.
+//! In: a calibration from all pairs, their corners, and the drift that was found. Out: the calibration of the same
+//! corners, each moved by what the drift did to it since that moment. Without this the drift would count as scatter of
+//! the pairs, although it is known, and the rig's covariance would be several times too large. The corners of the
+//! result are those that were seen: what is held out is not smoothed by the finding. Goes wrong: pairs that are chosen
+//! otherwise without the drift; then there is no result.
 
 use nalgebra::{Point2, Vector2};
 
@@ -14,8 +15,8 @@ use crate::stereo::findings::Along;
 use crate::stereo::init::board_pose;
 use crate::stereo::select::options::Options;
 
-/// The rig at a share of the drift; its lens may have fewer terms, where some only took up the drift. `None` where the same pairs are not the
-/// choice for it.
+/// The rig at a share of the drift; its lens may have fewer terms, where some only took up the drift. `None` where the
+/// same pairs are not the choice for it.
 pub fn at_share(
     found: &Calibration,
     corners: &Corners,

@@ -1,7 +1,8 @@
 //! The pose of a board on a rig that is known, and how far its pair misses that rig.
 //!
-//! In: a rig and the corners of a pair. Out: `left_from_board`. Method: start from each picture's homography of undistorted rays,
-//! then a bundle of the pose alone over both pictures; the better end wins. Goes wrong: too few corners, corners on a line.
+//! In: a rig and the corners of a pair. Out: `left_from_board`. Method: start from each picture's homography of
+//! undistorted rays, then a bundle of the pose alone over both pictures; the better end wins. Goes wrong: too few
+//! corners, corners on a line.
 
 use nalgebra::Matrix2;
 
@@ -17,8 +18,8 @@ use crate::stereo::solve::{Loss, Priors};
 /// What misses by less is exact: simulated corners without noise.
 const LEAST_PX: f64 = 1e-4;
 
-/// Fits the pose to the view's active corners, of which those far off hardly count, to about a tenth of a standard deviation. `None` where they do
-/// not determine it.
+/// Fits the pose to the view's active corners, of which those far off hardly count, to about a tenth of a standard
+/// deviation. `None` where they do not determine it.
 pub fn fit(shared: &Shared, view: &View) -> Option<Transform> {
     Some(best(shared, view, Loss::Cauchy)?.0)
 }
@@ -33,15 +34,16 @@ pub fn of_each_alone(shared: &Shared, view: &View) -> [Option<Transform>; 2] {
     Side::BOTH.map(|side| fit(shared, &view.only(side)))
 }
 
-/// The larger of both pictures' median residuals of a pair on a rig, px, with the pose that makes it least; of the one picture's that shows the
-/// board where only one does. `None` where the pair has no pose on it.
+/// The larger of both pictures' median residuals of a pair on a rig, px, with the pose that makes it least; of the one
+/// picture's that shows the board where only one does. `None` where the pair has no pose on it.
 pub fn misfit_px(shared: &Shared, view: &View) -> Option<(f64, Transform)> {
     let left_from_board = fit(shared, view)?;
     Some((worse_px(shared, view, &[left_from_board; 2], [1.0; 2])?, left_from_board))
 }
 
-/// How many times what each camera leaves of its own pictures, `alone_px`, a pair misses a rig by: the larger of both pictures'. Cameras of unlike size
-/// leave unlike px, so that each counts in its own. `poses` are those of [`as_one_board`] or [`as_two_boards`]. `None` where it has none.
+/// How many times what each camera leaves of its own pictures, `alone_px`, a pair misses a rig by: the larger of both
+/// pictures'. Cameras of unlike size leave unlike px, so that each counts in its own. `poses` are those of
+/// [`as_one_board`] or [`as_two_boards`]. `None` where it has none.
 pub fn times_alone(
     shared: &Shared,
     view: &View,
@@ -105,7 +107,8 @@ fn search(shared: &Shared, view: &View, start: Transform, loss: Loss, search: Se
     Some((*found.values.poses.first()?, found.cost)).filter(|(_, cost)| cost.is_finite())
 }
 
-/// `left_from_board` as one picture alone shows it, from the homography of its undistorted rays. `None` where its corners give none.
+/// `left_from_board` as one picture alone shows it, from the homography of its undistorted rays. `None` where its
+/// corners give none.
 pub fn of_picture(shared: &Shared, view: &View, side: Side) -> Option<Transform> {
     let camera = shared.rig.camera(side);
     let points = view.active(side).filter_map(|o| Some((o.board_mm, camera.undistort(&o.px)?)));

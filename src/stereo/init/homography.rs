@@ -1,7 +1,8 @@
 //! One picture of a flat board: its homography, what it says about the focal length, and the board's pose from it.
 //!
-//! Method: normalised direct linear transform (Hartley & Zisserman 2003, 4.4), Zhang's constraints (2000) with the principal
-//! point in the middle, the pose by the nearest rotation. Lens distortion is ignored: these are starting values.
+//! Method: normalised direct linear transform (Hartley & Zisserman 2003, 4.4), Zhang's constraints (2000) with the
+//! principal point in the middle, the pose by the nearest rotation. Lens distortion is ignored: these are starting
+//! values.
 
 use nalgebra::{DMatrix, Matrix3, Point2, Point3, Vector3};
 
@@ -16,8 +17,8 @@ pub const FEWEST_CORNERS: usize = 6;
 /// Corners that miss the homography by this many medians are left out of the next one.
 const FAR_MEDIANS: f64 = 6.0;
 
-/// The homography from the board's plane (mm) to given picture coordinates, and the median of what it leaves: a wrong corner among
-/// many good ones is left out. `None` for too few corners or corners on a line.
+/// The homography from the board's plane (mm) to given picture coordinates, and the median of what it leaves: a wrong
+/// corner among many good ones is left out. `None` for too few corners or corners on a line.
 pub fn homography(points: impl IntoIterator<Item = (Point3<f64>, Point2<f64>)>) -> Option<(Matrix3<f64>, f64)> {
     let points: Vec<_> = points.into_iter().collect();
     let mut found = direct(&points)?;
@@ -78,8 +79,8 @@ fn normaliser(points: impl Iterator<Item = Point2<f64>> + Clone) -> Option<(Matr
     usable.then_some((to, from))
 }
 
-/// Focal lengths along x and y, px, from homographies to pictures with this principal point: Zhang's two constraints a picture,
-/// least squares. `None` where the views do not tell (all fronto-parallel, or too far off for a pinhole).
+/// Focal lengths along x and y, px, from homographies to pictures with this principal point: Zhang's two constraints a
+/// picture, least squares. `None` where the views do not tell (all fronto-parallel, or too far off for a pinhole).
 pub fn focal_lengths(homographies: &[Matrix3<f64>], center: &Point2<f64>) -> Option<(f64, f64)> {
     let mut normal = nalgebra::Matrix2::zeros();
     let mut right = nalgebra::Vector2::zeros();

@@ -1,9 +1,9 @@
 //! Starting values: each camera alone.
 //!
-//! In: the views of one side. Out: its camera, a pose a picture, and each picture's own residual. Method: Zhang's focal length from
-//! the homographies, a bundle of one camera with a robust loss.
-//! Goes wrong: no picture tells the focal length (fronto-parallel boards only); then a few usual focal lengths are tried and
-//! the best fit is kept, and the covariance at the end says what it is worth.
+//! In: the views of one side. Out: its camera, a pose a picture, and each picture's own residual. Method: Zhang's focal
+//! length from the homographies, a bundle of one camera with a robust loss. Goes wrong: no picture tells the focal
+//! length (fronto-parallel boards only); then a few usual focal lengths are tried and the best fit is kept, and the
+//! covariance at the end says what it is worth.
 
 use nalgebra::{Matrix3, Point2};
 
@@ -70,7 +70,8 @@ pub fn known_camera(views: &[View], side: Side, camera: Camera) -> OneCamera {
     OneCamera { camera, poses, median_px }
 }
 
-/// The corners of one picture as those of a left one: seen by itself, either camera is the left one of a rig without a right one.
+/// The corners of one picture as those of a left one: seen by itself, either camera is the left one of a rig without a
+/// right one.
 pub fn as_left(view: &View, side: Side) -> View {
     let mut picture = view.only(side);
     for o in &mut picture.observations {
@@ -126,8 +127,8 @@ fn from_focal_length(
     Some((cost, OneCamera { camera, poses, median_px }))
 }
 
-/// The camera on all pictures: those that bend too much for a homography have one once the lens is known. Nothing is rejected here; the
-/// loss is robust.
+/// The camera on all pictures: those that bend too much for a homography have one once the lens is known. Nothing is
+/// rejected here; the loss is robust.
 fn add_the_others(pictures: &[View], chosen: &mut Vec<usize>, problem: &mut Problem) {
     let others: Vec<usize> = (0..pictures.len()).filter(|i| !chosen.contains(i)).collect();
     if others.is_empty() {

@@ -95,7 +95,8 @@ impl Judged {
         self.facts.standards.moves.finding(self.facts.volume.length_mm).filter(|_| !rig_fails)
     }
 
-    /// The line of the ledger that decides: the worst, and of several that are equally bad the one farthest beyond its limit.
+    /// The line of the ledger that decides: the worst, and of several that are equally bad the one farthest beyond its
+    /// limit.
     pub fn deciding(&self) -> Option<&Evidence> {
         let beyond = |line: &Evidence| line.value.zip(line.limit).map_or(f64::INFINITY, |(value, limit)| value / limit);
         let worst = self.evidence.iter().filter(|line| line.allows == self.verdict);
@@ -106,7 +107,8 @@ impl Judged {
         }
     }
 
-    /// The tolerance that this rig would meet as far as lengths go, mm; `None` where something else than a length stands against it.
+    /// The tolerance that this rig would meet as far as lengths go, mm; `None` where something else than a length
+    /// stands against it.
     pub fn trusted_mm(&self) -> Option<f64> {
         self.trusted().and_then(|line| line.value)
     }
@@ -131,7 +133,8 @@ impl Judged {
     }
 }
 
-/// Asks for another board where this one is bent by more than boards are: what a bow leaves beside the paraboloid that is fitted is in all lengths.
+/// Asks for another board where this one is bent by more than boards are: what a bow leaves beside the paraboloid that
+/// is fitted is in all lengths.
 fn bent(calibration: &Calibration) -> Option<String> {
     let [along_x, along_y, twist] = calibration.values.shared.shape_mm.map(f64::abs);
     let most = BOW_SHARE * calibration.board.diagonal_mm();
@@ -143,7 +146,8 @@ fn bent(calibration: &Calibration) -> Option<String> {
     })
 }
 
-/// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same deviations.
+/// Says where it is the board that scatters and not the corners, by enough to matter: both pictures then see the same
+/// deviations.
 fn print_scatter(calibration: &Calibration, facts: &Facts) -> Option<Warning> {
     /// Of independent corners the mean of thousands of points lies within a tenth of one.
     const SHARED: f64 = 0.25;

@@ -1,17 +1,21 @@
-//! Corners that say less about the rig than the others: measured much worse than usual, or contradicted by the other picture.
+//! Corners that say less about the rig than the others: measured much worse than usual, or contradicted by the other
+//! picture.
 //!
-//! In: measured pairs. Out: how many such corners there are and in which pictures; the lengths that end in them are left out, as long as they
-//! are few. A hand, a shadow or a hot column makes a few corners bad, which is no error of the rig; where many are bad it is.
+//! In: measured pairs. Out: how many such corners there are and in which pictures; the lengths that end in them are
+//! left out, as long as they are few. A hand, a shadow or a hot column makes a few corners bad, which is no error of
+//! the rig; where many are bad it is.
 
 use crate::stereo::judge::lengths::Measured;
 
 /// A corner whose standard deviation is this many times the usual one was not measured as the others are.
 const UNSURE: f64 = 3.0;
 
-/// Rays that miss each other by more standard deviations than this do not belong to one point: one in ten million does so by chance.
+/// Rays that miss each other by more standard deviations than this do not belong to one point: one in ten million does
+/// so by chance.
 pub const CONTRADICTED: f64 = 5.3;
 
-/// Share of the corners up to which they are exceptions; beyond it they are what this rig delivers, and every length counts.
+/// Share of the corners up to which they are exceptions; beyond it they are what this rig delivers, and every length
+/// counts.
 const EXCEPTIONS: f64 = 0.1;
 
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -41,8 +45,8 @@ impl DoubtfulCorners {
     }
 }
 
-/// Finds the doubtful corners and, where they are exceptions, leaves out the lengths that end in them. `names` are the pairs', `usual_px` is the
-/// corners' usual standard deviation.
+/// Finds the doubtful corners and, where they are exceptions, leaves out the lengths that end in them. `names` are the
+/// pairs', `usual_px` is the corners' usual standard deviation.
 pub(super) fn leave_out(measured: &mut [Measured], names: &[&str], usual_px: f64) -> DoubtfulCorners {
     let mut found = DoubtfulCorners::default();
     let mut marks = Vec::new();

@@ -1,4 +1,5 @@
-//! One fact that speaks for or against a rig: its figure, its limit with the reason, and the best verdict that it allows.
+//! One fact that speaks for or against a rig: its figure, its limit with the reason, and the best verdict that it
+//! allows.
 
 use std::borrow::Cow;
 
@@ -82,7 +83,8 @@ impl Evidence {
         }
     }
 
-    /// Value and limit for a page: lengths, which are what an error is at most, with three digits and rounded up; a limit as it was given.
+    /// Value and limit for a page: lengths, which are what an error is at most, with three digits and rounded up; a
+    /// limit as it was given.
     pub fn rounded(&self) -> [Option<String>; 2] {
         let is_length = self.unit == "mm";
         let value = self.value.map(|value| match self.limit {

@@ -1,4 +1,5 @@
-//! How good the rig is: lengths that were held out, a second board, what the residuals show, what the views lack, and the verdict.
+//! How good the rig is: lengths that were held out, a second board, what the residuals show, what the views lack, and
+//! the verdict.
 
 pub mod assessment;
 pub mod doubtful_corners;

@@ -1,7 +1,8 @@
 //! Tags of a grid that do not lie where the board has them: moved when the board was made, or printed elsewhere.
 //!
-//! In: a calibration by a grid of separate tags. Out: a line for a person. Method: what the rig misses the corners of one tag by, in the middle of all
-//! pictures, beside what it misses all corners by. Goes wrong: more than half of the tags, which are then what is usual.
+//! In: a calibration by a grid of separate tags. Out: a line for a person. Method: what the rig misses the corners of
+//! one tag by, in the middle of all pictures, beside what it misses all corners by. Goes wrong: more than half of the
+//! tags, which are then what is usual.
 
 use std::collections::BTreeMap;
 

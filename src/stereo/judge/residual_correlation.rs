@@ -1,9 +1,9 @@
 //! Are the residuals noise, or does something show in them that the model lacks?
 //!
-//! In: a calibration. Out: the correlation of neighbouring corners' residuals along the line that joins them (across it, fits whose
-//! windows overlap correlate without any fault), and the pattern that is common to all pairs in each cell of
-//! both pictures. Noise has neither. A pattern over the picture is a lens that the model cannot bend so; a correlation without one
-//! is a board that is not as assumed, or corners pulled by light and blur.
+//! In: a calibration. Out: the correlation of neighbouring corners' residuals along the line that joins them (across
+//! it, fits whose windows overlap correlate without any fault), and the pattern that is common to all pairs in each
+//! cell of both pictures. Noise has neither. A pattern over the picture is a lens that the model cannot bend so; a
+//! correlation without one is a board that is not as assumed, or corners pulled by light and blur.
 
 use nalgebra::Vector2;
 use serde::Serialize;
@@ -56,8 +56,8 @@ impl ResidualPattern {
         self.neighbours.along <= HARMLESS.max(SURE * self.neighbours.standard_error)
     }
 
-    /// Root mean square of what is no noise in the residuals, px: the pattern that all pairs share, or what neighbours have in common.
-    /// `sigma_px` is the corners' scatter. Zero where nothing but noise shows.
+    /// Root mean square of what is no noise in the residuals, px: the pattern that all pairs share, or what neighbours
+    /// have in common. `sigma_px` is the corners' scatter. Zero where nothing but noise shows.
     pub fn systematic_px(&self, sigma_px: f64) -> f64 {
         if self.white() { 0.0 } else { self.pattern_px().max(self.neighbours.along.max(0.0).sqrt() * sigma_px) }
     }

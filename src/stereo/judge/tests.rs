@@ -1,4 +1,5 @@
-//! Faults planted in corners of known worlds: each must be noticed and named by a line of the ledger, and clean corners by none.
+//! Faults planted in corners of known worlds: each must be noticed and named by a line of the ledger, and clean corners
+//! by none.
 
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 
@@ -36,7 +37,8 @@ fn calibrated_and_judged(corners: &Corners, second: Option<&Corners>) -> (Rig, J
     (found.rig().clone(), synthetic::judged(&found, findings, standards, TOLERANCE_MM))
 }
 
-/// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places without noise.
+/// The largest error with which a rig measures lengths between the corners of the world's boards, mm, from places
+/// without noise.
 fn largest_true_error_mm(world: &World, rig: &Rig) -> f64 {
     let of_pair = |points: &Vec<[Point3<f64>; 2]>| {
         let error = |[a, a1]: &[Point3<f64>; 2], [b, b1]: &[Point3<f64>; 2]| ((b1 - a1).norm() - (b - a).norm()).abs();
@@ -131,7 +133,8 @@ fn boards_that_are_hardly_tilted_do_not_pass() {
 #[test]
 fn a_board_in_other_units_does_not_pass() {
     let corners = world(12, 60).corners(61);
-    // A rig of 190 mm: in metres, in feet, and as it is; the smaller the board is said to be, the smaller are all errors.
+    // A rig of 190 mm: in metres, in feet, and as it is; the smaller the board is said to be, the smaller are all
+    // errors.
     for (factor, is_told) in [(1e-3, true), (1.0 / 304.8, true), (1.0, false)] {
         let said = Corners { board: corners.board.scaled(factor), ..corners.clone() };
         let judged = judge(&said);

@@ -26,8 +26,8 @@ impl Verdict {
         self.max(other)
     }
 
-    /// A pass where the value is within the limit (a value that is no number is not), undecided otherwise: for what casts doubt on a
-    /// rig without showing an error.
+    /// A pass where the value is within the limit (a value that is no number is not), undecided otherwise: for what
+    /// casts doubt on a rig without showing an error.
     pub fn within(value: f64, limit: f64) -> Verdict {
         if value <= limit { Verdict::Pass } else { Verdict::Undecided }
     }
@@ -36,8 +36,8 @@ impl Verdict {
 /// By what an uncertainty is expanded, and what a certificate says of the board.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expansion {
-    /// Coverage factor of what the calibration makes uncertain: as many standard deviations as hold 95 % where they are known from so many
-    /// pairs.
+    /// Coverage factor of what the calibration makes uncertain: as many standard deviations as hold 95 % where they are
+    /// known from so many pairs.
     pub calibration: f64,
     /// Expanded uncertainty of the board's own lengths, mm; `None` where nothing is known of it.
     pub board_mm: Option<f64>,
@@ -54,8 +54,8 @@ impl Expansion {
 /// 97.5 % quantile of the normal distribution.
 const NORMAL_95: f64 = 1.959_964;
 
-/// 97.5 % quantile of Student's distribution (the expansion of Fisher and Cornish, to the third power of the inverse freedom: right to
-/// one per cent from three degrees of freedom).
+/// 97.5 % quantile of Student's distribution (the expansion of Fisher and Cornish, to the third power of the inverse
+/// freedom: right to one per cent from three degrees of freedom).
 fn student_95(freedom: f64) -> f64 {
     let z = NORMAL_95;
     let power = |n: i32| z.powi(n);
@@ -100,7 +100,8 @@ impl LengthError {
         self.error_mm + self.expanded_without_corners_mm()
     }
 
-    /// The error that is not the corners' scatter is at least as large as this, mm, for whichever of very many lengths is looked at.
+    /// The error that is not the corners' scatter is at least as large as this, mm, for whichever of very many lengths
+    /// is looked at.
     pub fn at_least_mm(&self) -> f64 {
         self.error_mm - self.expanded_without_corners_mm().hypot(LARGEST_OF_MANY * self.corners_mm)
     }
@@ -130,9 +131,9 @@ impl Extremes {
         }
     }
 
-    /// Pass only where every error with its own uncertainty fits into the tolerance. Fail where one exceeds it by more than its ends scatter and
-    /// the calibration and the board are uncertain, or where one length in twenty does: then the scatter itself is too large. A few lengths
-    /// that corner noise carries across are no error of the rig.
+    /// Pass only where every error with its own uncertainty fits into the tolerance. Fail where one exceeds it by more
+    /// than its ends scatter and the calibration and the board are uncertain, or where one length in twenty does: then
+    /// the scatter itself is too large. A few lengths that corner noise carries across are no error of the rig.
     pub fn verdict(&self, tolerance_mm: f64) -> Verdict {
         if self.largest.at_most_mm() <= tolerance_mm {
             Verdict::Pass

@@ -1,7 +1,8 @@
 //! Do the views differ enough to tell the cameras, and what should be photographed next?
 //!
-//! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal length from the distance; corners near
-//! the borders determine the lens; different distances separate the lens from the focal length.
+//! In: a calibration. Out: how the views are spread, and advice where something is missing. Tilt separates the focal
+//! length from the distance; corners near the borders determine the lens; different distances separate the lens from
+//! the focal length.
 
 use nalgebra::{Point2, Point3, Vector2};
 
@@ -25,7 +26,8 @@ const LEAST_COVERAGE: f64 = 0.5;
 /// Corners in a cell that make it seen.
 const SEEN: usize = 3;
 
-/// Pairs below which a calibration's own uncertainty rests on too little: a fold then leaves out a tenth or more of all views.
+/// Pairs below which a calibration's own uncertainty rests on too little: a fold then leaves out a tenth or more of all
+/// views.
 pub const ENOUGH_PAIRS: usize = 10;
 
 /// How the views are spread.
@@ -116,7 +118,8 @@ impl Coverage {
     }
 }
 
-/// What to photograph where this pair alone reaches farthest out in one of the pictures: nothing checks what it says of the lens there.
+/// What to photograph where this pair alone reaches farthest out in one of the pictures: nothing checks what it says of
+/// the lens there.
 pub(super) fn beyond_others(calibration: &Calibration, pair: usize) -> Option<&'static str> {
     Side::BOTH.into_iter().find_map(|side| {
         let camera = calibration.rig().camera(side);

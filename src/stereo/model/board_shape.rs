@@ -4,8 +4,9 @@ use nalgebra::Point3;
 
 use crate::imaging::Board;
 
-/// Names of the shape's numbers as `calibration.json` has them: the heights of the paraboloids along x and y in the board's middle, and the
-/// height to which the twist lifts the first and the last corner (and lowers the other two), mm.
+/// Names of the shape's numbers as `calibration.json` has them: the heights of the paraboloids along x and y in the
+/// board's middle, and the height to which the twist lifts the first and the last corner (and lowers the other two),
+/// mm.
 pub const NAMES: [&str; NUMBERS] = ["board.kx_mm", "board.ky_mm", "board.kxy_mm"];
 
 /// How many numbers a shape has.
@@ -18,7 +19,8 @@ pub fn height_mm(lift: &[f64; NUMBERS], shape_mm: &[f64; NUMBERS]) -> f64 {
     lift.iter().zip(shape_mm).map(|(lift, height)| lift * height).sum()
 }
 
-/// How much one unit of each number of the shape lifts a place of the board: `1 - x^2`, `1 - y^2` and `x y` over [-1, 1]^2.
+/// How much one unit of each number of the shape lifts a place of the board: `1 - x^2`, `1 - y^2` and `x y` over [-1,
+/// 1]^2.
 pub fn lift(board: &Board, at: &Point3<f64>) -> [f64; NUMBERS] {
     let edge = board.corner_mm(board.columns() - 1, board.rows() - 1);
     let (x, y) = (at.x / edge.x, at.y / edge.y);

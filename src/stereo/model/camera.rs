@@ -81,7 +81,8 @@ impl Camera {
         Camera { width, height, fx: focal_px, fy: focal_px, cx, cy, lens, distortion }
     }
 
-    /// Where a point in the camera's frame (mm, any scale) falls in the raw picture, px. The point must lie in front (z > 0).
+    /// Where a point in the camera's frame (mm, any scale) falls in the raw picture, px. The point must lie in front (z
+    /// > 0).
     pub fn project(&self, point: &Point3<f64>) -> Point2<f64> {
         let d = self.distort(&Point2::new(point.x / point.z, point.y / point.z));
         Point2::new(self.fx * d.x + self.cx, self.fy * d.y + self.cy)

@@ -1,7 +1,9 @@
-//! Lenses that are known before the pictures: those of another calibration, with the covariance that it states or with a tolerance.
+//! Lenses that are known before the pictures: those of another calibration, with the covariance that it states or with
+//! a tolerance.
 //!
-//! In: a camera of each side whose lens is known, and their joint covariance where the calibration has one. Out: the numbers that are known,
-//! what they are expected to be, and how surely. Goes wrong: a covariance that is singular; then the cameras' own tolerance is taken.
+//! In: a camera of each side whose lens is known, and their joint covariance where the calibration has one. Out: the
+//! numbers that are known, what they are expected to be, and how surely. Goes wrong: a covariance that is singular;
+//! then the cameras' own tolerance is taken.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,8 +13,8 @@ use crate::stereo::data::Noise;
 use crate::stereo::model::parameters::{CAMERA_NAMES, Layout};
 use crate::stereo::{Camera, Error, Lens, Rig};
 
-/// What a lens is known to where its calibration states no covariance, as a share of the focal length, anywhere in the picture: careful
-/// calibrations of one camera repeat to about this.
+/// What a lens is known to where its calibration states no covariance, as a share of the focal length, anywhere in the
+/// picture: careful calibrations of one camera repeat to about this.
 pub const TOLERANCE: f64 = 5e-4;
 
 /// Cameras whose lenses are known.
@@ -23,7 +25,8 @@ pub struct KnownLenses {
     covariance: DMatrix<f64>,
     /// Whether the calibration states it.
     stated: [bool; 2],
-    /// How far pairs scattered about the rig of that calibration beyond their corners' noise, as a variance; one where it does not say.
+    /// How far pairs scattered about the rig of that calibration beyond their corners' noise, as a variance; one where
+    /// it does not say.
     pub pair_excess: f64,
     /// How many pairs with poses of their own say so; `None` where it does not say.
     pub pairs: Option<usize>,
@@ -46,7 +49,8 @@ impl KnownLenses {
         known
     }
 
-    /// Cameras without a covariance: each number is known to what moves a point by [`TOLERANCE`] at the corner of the picture.
+    /// Cameras without a covariance: each number is known to what moves a point by [`TOLERANCE`] at the corner of the
+    /// picture.
     pub fn of_cameras(cameras: [Option<Camera>; 2]) -> KnownLenses {
         let mut known = KnownLenses {
             cameras,
@@ -143,7 +147,8 @@ impl KnownLenses {
         Some(DVector::from_iterator(numbers.len(), numbers.into_iter().map(of)))
     }
 
-    /// The same cameras, known so badly that pictures decide: a search that starts there does not run away where they say nothing.
+    /// The same cameras, known so badly that pictures decide: a search that starts there does not run away where they
+    /// say nothing.
     pub fn loosened(&self) -> KnownLenses {
         /// To a tenth of the focal length anywhere in the picture.
         const LOOSE: f64 = 0.1 / TOLERANCE;
@@ -151,7 +156,8 @@ impl KnownLenses {
         KnownLenses { covariance: loose.covariance * (LOOSE * LOOSE), ..loose }
     }
 
-    /// The same as it counts beside corners whose weights leave out that the numbers scatter by so much more, as a variance.
+    /// The same as it counts beside corners whose weights leave out that the numbers scatter by so much more, as a
+    /// variance.
     pub fn weighing(&self, scatter: f64) -> KnownLenses {
         KnownLenses { covariance: &self.covariance / scatter, ..self.clone() }
     }

@@ -1,7 +1,7 @@
 //! Derivatives of the projection: what Newton's method, the bundle and the propagation of covariances stand on.
 //!
-//! In: a camera and a point in its frame. Out: the pixel and its derivatives by the point and by the camera's own numbers.
-//! The equations are those of OpenCV's `calib3d` documentation, differentiated by hand.
+//! In: a camera and a point in its frame. Out: the pixel and its derivatives by the point and by the camera's own
+//! numbers. The equations are those of OpenCV's `calib3d` documentation, differentiated by hand.
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2, Vector3};
 

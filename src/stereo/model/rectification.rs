@@ -1,8 +1,9 @@
 //! Pictures as two cameras side by side would have taken them: corresponding points on one row.
 //!
-//! In: a rig. Out: what OpenCV's `stereoRectify` says of it (Bouguet's method: each camera takes half of the turn between them, then both
-//! turn until x lies along the baseline), where a raw point falls, and how far the rows of measured points differ. Goes wrong: cameras
-//! that look at each other, or one that stands in front of the other, have no common rows.
+//! In: a rig. Out: what OpenCV's `stereoRectify` says of it (Bouguet's method: each camera takes half of the turn
+//! between them, then both turn until x lies along the baseline), where a raw point falls, and how far the rows of
+//! measured points differ. Goes wrong: cameras that look at each other, or one that stands in front of the other, have
+//! no common rows.
 
 use nalgebra::{Matrix3, Matrix3x4, Matrix4, Point2, Point3, Vector3, Vector4};
 use serde::Serialize;
@@ -17,10 +18,11 @@ use crate::stereo::{Camera, Rig, Side};
 /// How much of the raw pictures is kept, in OpenCV's words.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scaling {
-    /// 0: only pixels that both lenses saw; 1: every raw pixel; -1: OpenCV's own choice, which neither cuts nor shrinks much.
+    /// 0: only pixels that both lenses saw; 1: every raw pixel; -1: OpenCV's own choice, which neither cuts nor shrinks
+    /// much.
     pub alpha: f64,
-    /// True: both principal points are the same, so that points at infinity have no disparity. Cameras that look at one near
-    /// place then lose it from view.
+    /// True: both principal points are the same, so that points at infinity have no disparity. Cameras that look at one
+    /// near place then lose it from view.
     pub zero_disparity: bool,
 }
 
@@ -39,7 +41,8 @@ const NO_DISTORTION: [f64; 4] = [0.0; 4];
 
 /// Whether OpenCV finds the places of a picture's corners and of the middles of its sides without their distortion.
 fn holds_at_borders(camera: &Camera) -> Result<bool, Failure> {
-    /// Five steps of its iteration leave some pixels of a wide lens, and diverge where the model folds; a share of the picture's width.
+    /// Five steps of its iteration leave some pixels of a wide lens, and diverge where the model folds; a share of the
+    /// picture's width.
     const NEAR: f64 = 0.05;
     let [right, bottom] = [camera.width, camera.height].map(|size| f64::from(size) - 1.0);
     let along = |end: f64| [0.0, 0.5 * end, end];
@@ -62,8 +65,8 @@ pub struct Matrices {
 }
 
 impl Matrices {
-    /// Asks OpenCV. It scales and centres the rectified pictures by where the raw ones' borders lie undistorted; where it does not find that, for a
-    /// lens model that holds no longer there, by cameras without distortion.
+    /// Asks OpenCV. It scales and centres the rectified pictures by where the raw ones' borders lie undistorted; where
+    /// it does not find that, for a lens model that holds no longer there, by cameras without distortion.
     pub fn new(rig: &Rig, scaling: Scaling) -> Result<Matrices, Failure> {
         let cameras = [&rig.left, &rig.right];
         let holds = cameras.into_iter().map(holds_at_borders).collect::<Result<Vec<bool>, Failure>>()?;
@@ -95,14 +98,16 @@ pub fn essential(rig: &Rig) -> Matrix3<f64> {
     t.cross_matrix() * rotation_matrix(&rig.right_from_left)
 }
 
-/// `F` of undistorted pixels, its last element one, as OpenCV's `stereoCalibrate` gives it. `None` where a matrix of a camera cannot be inverted.
+/// `F` of undistorted pixels, its last element one, as OpenCV's `stereoCalibrate` gives it. `None` where a matrix of a
+/// camera cannot be inverted.
 pub fn fundamental(rig: &Rig) -> Option<Matrix3<f64>> {
     let f = rig.right.matrix().try_inverse()?.transpose() * essential(rig) * rig.left.matrix().try_inverse()?;
     let last = f[(2, 2)];
     Some(if last == 0.0 { f } else { f / last })
 }
 
-/// How far the rows of corresponding points differ in rectified pictures (columns, where the cameras stand one above the other).
+/// How far the rows of corresponding points differ in rectified pictures (columns, where the cameras stand one above
+/// the other).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct RowResidual {
     /// Points seen in both pictures.
@@ -132,14 +137,15 @@ pub fn row_residual(differences: &[f64]) -> Option<RowResidual> {
     })
 }
 
-/// How large a board of known size comes out of the disparities of its corners: what turns the cameras about the common columns leaves the rows as they
-/// are and changes that.
+/// How large a board of known size comes out of the disparities of its corners: what turns the cameras about the common
+/// columns leaves the rows as they are and changes that.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SizeResidual {
     pub pairs: usize,
     /// How many times as large as it is, in the middle one of the pairs.
     pub times: f64,
-    /// By how much the disparities are larger than they would be if the board came out as large as it is, px, in the middle one of the pairs.
+    /// By how much the disparities are larger than they would be if the board came out as large as it is, px, in the
+    /// middle one of the pairs.
     pub disparity_px: f64,
     /// By how much the board's diagonal comes out longer, mm.
     pub diagonal_mm: f64,
@@ -148,7 +154,8 @@ pub struct SizeResidual {
 }
 
 impl SizeResidual {
-    /// Of corners in rectified pictures, beside what lengths can be trusted to, mm; `None` where no pair has enough of them.
+    /// Of corners in rectified pictures, beside what lengths can be trusted to, mm; `None` where no pair has enough of
+    /// them.
     pub fn of(
         pairs: &[PairCorners],
         board: &Board,
@@ -163,9 +170,11 @@ impl SizeResidual {
     }
 }
 
-/// How many times as large as it is the board of a pair comes out, and by how much the disparities of its corners are off then, px.
+/// How many times as large as it is the board of a pair comes out, and by how much the disparities of its corners are
+/// off then, px.
 ///
-/// Method: the similarity that fits the corners to the board's (Umeyama, 1991); a depth goes with one over the disparity.
+/// Method: the similarity that fits the corners to the board's (Umeyama, 1991); a depth goes with one over the
+/// disparity.
 fn size_of(pair: &PairCorners, board: &Board, matrices: &Matrices) -> Option<(f64, f64)> {
     /// Fewer corners are no board.
     const FEWEST: usize = 4;
@@ -301,7 +310,8 @@ mod tests {
         assert!((right_px.dot(&swapped) / swapped.xy().norm()).abs() > 1.0);
     }
 
-    /// A lens that turns back a little outside of the middle half of its picture: fine where boards stood, and nowhere else.
+    /// A lens that turns back a little outside of the middle half of its picture: fine where boards stood, and nowhere
+    /// else.
     fn folding() -> Camera {
         let mut camera = Camera::pinhole(640, 480, 490.0);
         camera.lens = Lens::Brown5;

@@ -65,8 +65,8 @@ impl Rig {
         }
     }
 
-    /// Whether a plate of these half sides (mm), in its own x-y plane, is wholly inside both pictures; `border` is what stays clear at the
-    /// edge, as a share of a picture's width.
+    /// Whether a plate of these half sides (mm), in its own x-y plane, is wholly inside both pictures; `border` is what
+    /// stays clear at the edge, as a share of a picture's width.
     pub fn sees_plate(&self, left_from_plate: &Transform, (w, h): (f64, f64), border: f64) -> bool {
         [(-w, -h), (w, -h), (w, h), (-w, h)].iter().all(|&(x, y)| {
             let point = left_from_plate * Point3::new(x, y, 0.0);
@@ -92,8 +92,9 @@ impl Rig {
         self.unusual_place().into_iter().chain(self.unusual_tilt()).chain(self.unusual_centre()).collect()
     }
 
-    /// What is unusual in how the cameras stand, where something is: the left one on the right side, or one rolled against the other. Both may
-    /// be meant, and no residual tells: a rig whose folders are exchanged, or with all pictures of one side turned, is a rig.
+    /// What is unusual in how the cameras stand, where something is: the left one on the right side, or one rolled
+    /// against the other. Both may be meant, and no residual tells: a rig whose folders are exchanged, or with all
+    /// pictures of one side turned, is a rig.
     fn unusual_place(&self) -> Option<String> {
         let rotation = crate::geometry::rotation_matrix(&self.right_from_left);
         let roll_deg = rotation[(1, 0)].atan2(rotation[(1, 1)]).to_degrees();
@@ -131,8 +132,9 @@ impl Rig {
         ))
     }
 
-    /// A sensor that is tilted by more than sensors are that are not meant to be. Where a lens bends little, a tilt is exchanged for the picture's
-    /// centre and the camera's axis: then lengths hold, and neither of the three is what a person could measure on the camera.
+    /// A sensor that is tilted by more than sensors are that are not meant to be. Where a lens bends little, a tilt is
+    /// exchanged for the picture's centre and the camera's axis: then lengths hold, and neither of the three is what a
+    /// person could measure on the camera.
     fn unusual_tilt(&self) -> Option<String> {
         const MOST_DEG: f64 = 3.0;
         let tilt_deg = |side: Side| {

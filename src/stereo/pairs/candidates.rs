@@ -1,5 +1,5 @@
-//! The pairs that may make up a rig: those with a board in both pictures, each once; of boards whose corners have numbers of their own also those
-//! that one picture shows.
+//! The pairs that may make up a rig: those with a board in both pictures, each once; of boards whose corners have
+//! numbers of their own also those that one picture shows.
 
 use rayon::prelude::*;
 
@@ -87,8 +87,8 @@ impl Candidates {
 }
 
 impl Candidates {
-    /// The number of pairs and the most that a corner moves from one to another, px, where they all show the board in one pose: by a small part of what
-    /// a board must move over the pictures that are to tell the cameras.
+    /// The number of pairs and the most that a corner moves from one to another, px, where they all show the board in
+    /// one pose: by a small part of what a board must move over the pictures that are to tell the cameras.
     pub fn one_pose(&self) -> Option<(usize, f64)> {
         /// Of a picture's width.
         const HARDLY: f64 = 0.005;
@@ -120,7 +120,8 @@ fn blind(corners: &Corners, views: &[View], side: Side) -> Option<Error> {
     (HARDLY * found <= total).then(error)
 }
 
-/// What is said of a pair of which so few corners count. Of those that were seen and not measured, smeared or in glare, the rest is.
+/// What is said of a pair of which so few corners count. Of those that were seen and not measured, smeared or in glare,
+/// the rest is.
 fn too_few_corners(pair: &PairCorners, counting: [usize; 2]) -> String {
     let [left, right] = counting;
     let [of_left, of_right] = [pair.left.len(), pair.right.len()];

@@ -96,7 +96,8 @@ impl Cause {
         matches!(self, Cause::Unknown | Cause::NotSimultaneous | Cause::OtherBoard)
     }
 
-    /// True where the pair is one of the series and contradicts the others: not one without a board, shown twice, or of a rig that stood before.
+    /// True where the pair is one of the series and contradicts the others: not one without a board, shown twice, or of
+    /// a rig that stood before.
     pub fn contradicts(self) -> bool {
         use Cause::{Before, CameraMoved, Duplicate, Focus, NoBoard};
         !matches!(self, NoBoard | Duplicate | Before | CameraMoved | Focus)
@@ -165,7 +166,8 @@ impl Discarded {
     }
 }
 
-/// Which pairs the rig is that of. A rig that changed while it was photographed is two rigs; the one that stands now is the last.
+/// Which pairs the rig is that of. A rig that changed while it was photographed is two rigs; the one that stands now is
+/// the last.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Standing {
     /// The first pair of the rig that stands now, where there was another before it.

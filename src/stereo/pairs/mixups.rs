@@ -1,9 +1,9 @@
 //! Pictures that do not belong together, or are not as the camera wrote them.
 //!
-//! In: all pairs of a series, the rig that most of them agree on, and which do not fit it. Out: what was mixed up in these, with what to do.
-//! Method: every idea of what happened is a change of the corners (sides exchanged, a picture turned or mirrored, another pair's
-//! picture) under which the pair must fit as well as the others do; the first that does is the reason. Goes wrong: two things that
-//! happened to one pair.
+//! In: all pairs of a series, the rig that most of them agree on, and which do not fit it. Out: what was mixed up in
+//! these, with what to do. Method: every idea of what happened is a change of the corners (sides exchanged, a picture
+//! turned or mirrored, another pair's picture) under which the pair must fit as well as the others do; the first that
+//! does is the reason. Goes wrong: two things that happened to one pair.
 
 use nalgebra::Point2;
 use rayon::prelude::*;
@@ -25,8 +25,8 @@ const ENOUGH_CORNERS: usize = 40;
 /// Pairs that are tried as the home of a picture, those with the board nearest to where it shows it.
 const NEAREST: usize = 3;
 
-/// Share of the limit for pairs within which one fits that was turned or mirrored back: a board near the middle that is seen nearly square
-/// looks alike from behind, and half fits what it is not.
+/// Share of the limit for pairs within which one fits that was turned or mirrored back: a board near the middle that is
+/// seen nearly square looks alike from behind, and half fits what it is not.
 const FITS_WELL: f64 = 0.5;
 
 /// A series of pairs, the rig that most of them agree on, and which of them do not.
@@ -98,7 +98,8 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// True where the view fits on a rig, within a share of the limit, in one of the numberings that the board's outline allows.
+    /// True where the view fits on a rig, within a share of the limit, in one of the numberings that the board's
+    /// outline allows.
     fn fits(&self, shared: &Shared, view: &View, share: f64) -> bool {
         let limit = share * self.series.limit_px;
         self.series.board.turns_of_outline().into_iter().any(|quarters| self.fits_turned(shared, view, quarters, limit))
@@ -154,7 +155,8 @@ impl Scene<'_> {
         })
     }
 
-    /// Whether a picture's corners are those of a board through a camera of any focal length: one that was zoomed or focused shows a board.
+    /// Whether a picture's corners are those of a board through a camera of any focal length: one that was zoomed or
+    /// focused shows a board.
     fn is_board(&self, i: usize, side: Side) -> bool {
         let camera = *self.series.shared.rig.camera(side);
         let view = as_left(&self.series.views[i], side);

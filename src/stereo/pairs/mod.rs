@@ -23,12 +23,12 @@ pub fn fewest_pairs(known: Option<&KnownLenses>) -> usize {
     if known.is_some_and(KnownLenses::both) { FEWEST_OF_KNOWN } else { FEWEST_PAIRS }
 }
 
-/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one moment: a lens or a rig
-/// that lacks something leaves no more than about this.
+/// Pairs that usually miss their rig by so many times what each camera leaves of its own pictures were not taken at one
+/// moment: a lens or a rig that lacks something leaves no more than about this.
 pub const TIMES: f64 = 3.0;
 
-/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in the rig is twice that in
-/// one camera.
+/// From so many times on, half of what the pictures tell of the lenses is lost in the pairs: their corners' variance in
+/// the rig is twice that in one camera.
 const HALF_IS_LOST: f64 = std::f64::consts::SQRT_2;
 
 /// How many times what each camera leaves of its own pictures the pairs usually miss their rig by.
@@ -43,7 +43,8 @@ impl Missed {
         self.times > TIMES
     }
 
-    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two pictures.
+    /// Whether each camera alone tells more of its lens than the pairs do, in which something moved between the two
+    /// pictures.
     pub fn is_better_alone(&self) -> bool {
         self.times > HALF_IS_LOST
     }

@@ -1,10 +1,11 @@
 //! What happened to pairs in which nothing was mixed up and that miss the rig of the others by far.
 //!
-//! In: a series with its rig, and those pairs. Out: a cause a pair, with figures. Method: a board whose squares are larger by a share is taken for
-//! nearer by each camera along its own rays: the two places that the cameras give it are apart along the baseline, by that share of
-//! it. One number explains such a pair; a board or a camera that moved between the two pictures takes six. A board that moved along the
-//! baseline looks the same, and a baseline that changed: all are told, what is commonest first, that the board moved; where others show the same
-//! other size, and, where others moved, three do, that it is a board. Goes wrong: several boards of one other size that all moved alike.
+//! In: a series with its rig, and those pairs. Out: a cause a pair, with figures. Method: a board whose squares are
+//! larger by a share is taken for nearer by each camera along its own rays: the two places that the cameras give it are
+//! apart along the baseline, by that share of it. One number explains such a pair; a board or a camera that moved
+//! between the two pictures takes six. A board that moved along the baseline looks the same, and a baseline that
+//! changed: all are told, what is commonest first, that the board moved; where others show the same other size, and,
+//! where others moved, three do, that it is a board. Goes wrong: several boards of one other size that all moved alike.
 
 use nalgebra::Vector3;
 
@@ -19,7 +20,8 @@ use crate::stereo::pairs::{Cause, DiscardedPair, Missed};
 /// Shares that differ by no more than this part of them are of one board.
 const ONE_SIZE: f64 = 0.1;
 
-/// Others of one size beside which a pair is of a board even where boards moved: two that moved alike are found among any dozen.
+/// Others of one size beside which a pair is of a board even where boards moved: two that moved alike are found among
+/// any dozen.
 const ENOUGH_OF_MOVED: usize = 2;
 
 /// How the two pictures of a pair disagree.
@@ -31,8 +33,8 @@ struct Apart {
     larger: Option<f64>,
 }
 
-/// What happened to each of these pairs; with each comes by how much it misses the rig, px, where it has a pose on it. `missed` is how far the pairs miss
-/// it usually.
+/// What happened to each of these pairs; with each comes by how much it misses the rig, px, where it has a pose on it.
+/// `missed` is how far the pairs miss it usually.
 pub fn explain(series: &Series, strays: &[(usize, Option<f64>)], usual_px: f64, missed: Missed) -> Vec<DiscardedPair> {
     let apart: Vec<Option<Apart>> = strays.iter().map(|&(i, px)| apart(series, i, px)).collect();
     let others_moved = missed.is_of_two_moments() || apart.iter().flatten().any(|apart| apart.larger.is_none());
@@ -95,7 +97,8 @@ fn apart(series: &Series, i: usize, missed_px: Option<f64>) -> Option<Apart> {
     Some(Apart { way_mm, turned_rad, larger: fits.then_some(share) })
 }
 
-/// The pair as one of a board that is larger by the share that fits best, and that share; the start is some parts of it off.
+/// The pair as one of a board that is larger by the share that fits best, and that share; the start is some parts of it
+/// off.
 fn of_best_size(shared: &Shared, view: &View, start: f64) -> (View, f64) {
     let sized = |share: f64| {
         let mut sized = view.clone();

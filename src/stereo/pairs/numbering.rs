@@ -1,10 +1,10 @@
 //! How a board's corners are numbered: the turns that leave it looking the same, and which of them a picture needs.
 //!
-//! In: a board, and the poses that pictures give it. Out: quarter turns of the numbering. A board whose outline or colours are the same
-//! after a turn in its plane can be numbered from several corners, and a picture alone does not say from which. Two pictures of one pair
-//! must agree, and the place of the cameras to each other decides: turns differ by at least 90 degrees, poses from single
-//! pictures by a few. That holds for any roll of one camera against the other. Which way a pair as a whole is numbered stays open.
-//! Goes wrong: no pose from one of the pictures.
+//! In: a board, and the poses that pictures give it. Out: quarter turns of the numbering. A board whose outline or
+//! colours are the same after a turn in its plane can be numbered from several corners, and a picture alone does not
+//! say from which. Two pictures of one pair must agree, and the place of the cameras to each other decides: turns
+//! differ by at least 90 degrees, poses from single pictures by a few. That holds for any roll of one camera against
+//! the other. Which way a pair as a whole is numbered stays open. Goes wrong: no pose from one of the pictures.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -33,8 +33,8 @@ pub fn on_rig(shared: &Shared, board: &Board, view: &View) -> Option<usize> {
     board.turns_left_open().into_iter().min_by(|a, b| angle(*a).total_cmp(&angle(*b)))
 }
 
-/// A pair's corners, weighed by their noise where it is known, and numbered as a rig has it: how the cameras stand decides between numberings
-/// that the pictures leave open.
+/// A pair's corners, weighed by their noise where it is known, and numbered as a rig has it: how the cameras stand
+/// decides between numberings that the pictures leave open.
 pub fn seen_on_rig(shared: &Shared, board: &Board, pair: &PairCorners, noise: Option<&Noise>) -> View {
     let mut view = View::new(board, pair, FEWEST_CORNERS);
     if let Some(noise) = noise {
@@ -44,8 +44,8 @@ pub fn seen_on_rig(shared: &Shared, board: &Board, pair: &PairCorners, noise: Op
     view
 }
 
-/// Where the right camera stands as most pairs have it, and the turn of each pair's right numbering that agrees with it.
-/// `poses` are `left_from_board` and `right_from_board` of every pair, each from its own picture.
+/// Where the right camera stands as most pairs have it, and the turn of each pair's right numbering that agrees with
+/// it. `poses` are `left_from_board` and `right_from_board` of every pair, each from its own picture.
 pub fn agreed(
     turns: &[usize],
     poses: &[Option<(Transform, Transform)>],
@@ -71,14 +71,15 @@ fn deviation(a: &Transform, b: &Transform, distance_mm: f64) -> f64 {
         + (a.translation.vector - b.translation.vector).norm() / distance_mm.max(f64::MIN_POSITIVE)
 }
 
-/// The `right_from_left` that the pairs agree on: the one whose deviation from all pairs is smallest in the median. A pair may
-/// offer several (a board that looks the same after a half turn); its nearest counts.
+/// The `right_from_left` that the pairs agree on: the one whose deviation from all pairs is smallest in the median. A
+/// pair may offer several (a board that looks the same after a half turn); its nearest counts.
 fn agreed_transform(choices: &[Vec<Transform>], distance_mm: f64) -> Option<Transform> {
     let off = |a: &Transform| {
         let nearest = |pair: &Vec<Transform>| {
             pair.iter().map(|b| deviation(a, b, distance_mm)).min_by(f64::total_cmp).unwrap_or(f64::INFINITY)
         };
-        // Boards that are all seen alike leave two equal answers: cameras side by side are rolled less than a half turn.
+        // Boards that are all seen alike leave two equal answers: cameras side by side are rolled less than a half
+        // turn.
         median(choices.iter().map(nearest)).unwrap_or(f64::INFINITY) + 1e-3 * rotation_vector(a).norm()
     };
     choices.iter().flatten().min_by(|a, b| off(a).total_cmp(&off(b))).copied()

@@ -1,9 +1,10 @@
 //! Pairs in which a picture leaves open which of a plain board's corners it shows, numbered by how the cameras stand.
 //!
-//! In: corners, some pairs with several ways to number them, and a rig: one that is known, or that of the pairs that leave nothing open. Out: the
-//! corners with those pairs that are numbered. Method: in a wrong number the board lies at least a square away from where the other picture has it,
-//! so every way but the right one misses the rig by many px. Goes wrong: both pictures are cut alike, so that the same wrong number in both fits as
-//! well; or the rig misses the pair by as much as a square. Such a pair stays left out.
+//! In: corners, some pairs with several ways to number them, and a rig: one that is known, or that of the pairs that
+//! leave nothing open. Out: the corners with those pairs that are numbered. Method: in a wrong number the board lies at
+//! least a square away from where the other picture has it, so every way but the right one misses the rig by many px.
+//! Goes wrong: both pictures are cut alike, so that the same wrong number in both fits as well; or the rig misses the
+//! pair by as much as a square. Such a pair stays left out.
 
 use rayon::prelude::*;
 

@@ -1,11 +1,11 @@
 //! The pairs that one rig is calibrated from, and what happened to the others.
 //!
-//! In: candidates. Out: the views with values to start from, and the pairs that are left out with their causes. Method: the numbering
-//! that most pairs agree on, the relative pose that lies in their middle, one robust bundle over all of them. A pair is left out only
-//! where it misses the rig of all by several times what pairs usually do: then its pictures do not belong together, or something else
-//! happened to it. How much pairs usually miss their rig is estimated from the pairs at hand; hand-held boards before
-//! cameras that nobody triggered miss it by much more than their corners scatter, and belong to it all the same.
-//! Goes wrong: half of the pairs or more contradict the others.
+//! In: candidates. Out: the views with values to start from, and the pairs that are left out with their causes. Method:
+//! the numbering that most pairs agree on, the relative pose that lies in their middle, one robust bundle over all of
+//! them. A pair is left out only where it misses the rig of all by several times what pairs usually do: then its
+//! pictures do not belong together, or something else happened to it. How much pairs usually miss their rig is
+//! estimated from the pairs at hand; hand-held boards before cameras that nobody triggered miss it by much more than
+//! their corners scatter, and belong to it all the same. Goes wrong: half of the pairs or more contradict the others.
 
 use rayon::prelude::*;
 
@@ -31,8 +31,8 @@ const MOST_ROUNDS: usize = 5;
 /// The lens with which pairs are looked at before there is another: what nearly all cameras need.
 const FIRST_LENS: Lens = Lens::Brown5;
 
-/// A rig that misses half of its pairs by more than this share of the picture's width, and by several times what each camera leaves of its
-/// own pictures, is the rig of none of them.
+/// A rig that misses half of its pairs by more than this share of the picture's width, and by several times what each
+/// camera leaves of its own pictures, is the rig of none of them.
 const LARGEST_SHARE: f64 = 2e-3;
 
 /// The pairs of a rig, near their common minimum.
@@ -52,8 +52,9 @@ pub struct Series {
 /// What a pair leaves on a rig: px, and its pose. `None` where it has none.
 type Misfit = Option<(f64, Transform)>;
 
-/// Finds the pairs of the rig. With `runs`, the first or the last pairs of the series stay where they contradict the others and nothing was
-/// mixed up in them: a rig that changed is a step to be found over the series, and not a few bad pairs.
+/// Finds the pairs of the rig. With `runs`, the first or the last pairs of the series stay where they contradict the
+/// others and nothing was mixed up in them: a rig that changed is a step to be found over the series, and not a few bad
+/// pairs.
 pub fn find(candidates: &Candidates, runs: bool) -> Result<Series, Error> {
     let (views, first) = numbered(candidates)?;
     let mut shared = first;

@@ -62,7 +62,8 @@ impl Looks<'_> {
         FALSE_ALARM / (self.hypotheses.len() + 1) as f64
     }
 
-    /// The difference that tells sizes and causes: that to the pairs' own rig, unless a few pairs that contradict each other have led it away.
+    /// The difference that tells sizes and causes: that to the pairs' own rig, unless a few pairs that contradict each
+    /// other have led it away.
     pub fn nearer(&self) -> &Difference {
         const SEVERAL: f64 = 4.0;
         let led_away = |old: &&Difference| self.own.chi_square() > SEVERAL * old.chi_square();
@@ -98,8 +99,9 @@ impl Looks<'_> {
         difference.chi_square() > difference.limit(difference.off.len(), chance) || self.hypotheses.iter().any(alone)
     }
 
-    /// What explains the change: causes that leave no more than chance and are not told apart, the likeliest first; or another place of the
-    /// right camera in all six numbers, where that alone leaves no more than chance or does better by more than its numbers cost.
+    /// What explains the change: causes that leave no more than chance and are not told apart, the likeliest first; or
+    /// another place of the right camera in all six numbers, where that alone leaves no more than chance or does better
+    /// by more than its numbers cost.
     pub fn explained(&self) -> Explained {
         let (difference, hypotheses) = (self.nearer(), self.hypotheses);
         let count = difference.off.len();
@@ -124,8 +126,9 @@ impl Looks<'_> {
         Explained::Causes(near.map(|(_, i)| i).collect())
     }
 
-    /// What is said of a change that neither a cause of one number nor another place of the right camera explains: pictures of one side that were cut
-    /// otherwise, where that leaves no more than chance, else the cause that comes nearest.
+    /// What is said of a change that neither a cause of one number nor another place of the right camera explains:
+    /// pictures of one side that were cut otherwise, where that leaves no more than chance, else the cause that comes
+    /// nearest.
     fn without_cause(&self) -> Explained {
         /// Share of the squared difference that a cause leaves at the most that nearly explains it.
         const NEARLY: f64 = 0.1;

@@ -1,12 +1,13 @@
 //! Whether a rig that was calibrated earlier is still the one that takes these pictures.
 //!
-//! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far that moves a
-//! length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs give a rig by themselves, from the old
-//! one on; the difference of its numbers against both covariances, all of them together and each cause as a direction of its own
-//! ([`crate::difference`]), all looks together at one level; a change is what shows from the old rig on as well as from the new one, and where
-//! the pairs' own rig lies several times farther off than the equations at the old one foretell, the latter tell its size. A change of a cause
-//! is seen in nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are said to see. Goes wrong: pairs that are all alike hardly
-//! see a focus; that is what the stated figures say.
+//! In: a rig with its covariance, and the corners of two or more new pairs. Out: whether it changed, by what, how far
+//! that moves a length, and the smallest change of each kind that the pairs would have shown. Method: the new pairs
+//! give a rig by themselves, from the old one on; the difference of its numbers against both covariances, all of them
+//! together and each cause as a direction of its own ([`crate::difference`]), all looks together at one level; a change
+//! is what shows from the old rig on as well as from the new one, and where the pairs' own rig lies several times
+//! farther off than the equations at the old one foretell, the latter tell its size. A change of a cause is seen in
+//! nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are
+//! said to see. Goes wrong: pairs that are all alike hardly see a focus; that is what the stated figures say.
 
 mod looks;
 mod strays;
@@ -64,14 +65,16 @@ pub struct Recheck {
     /// Pairs that were compared.
     pub pairs: Vec<String>,
     pub skipped: Vec<Skipped>,
-    /// Of those compared, pairs that contradict the old rig by themselves: what few of them say is lost among the others.
+    /// Of those compared, pairs that contradict the old rig by themselves: what few of them say is lost among the
+    /// others.
     pub strays: Vec<Stray>,
     /// Length that changes are given for, mm.
     pub length_mm: f64,
     pub causes: Vec<CauseSeen>,
     /// What explains the change; `None` where nothing changed.
     pub change: Option<Explained>,
-    /// By how much the change moves a length, mm: that of the likeliest cause, or of all numbers together; zero where nothing changed.
+    /// By how much the change moves a length, mm: that of the likeliest cause, or of all numbers together; zero where
+    /// nothing changed.
     pub effect_mm: f64,
     /// The largest change of a length that a single cause could make without being seen, mm.
     pub seen_mm: f64,
@@ -134,8 +137,8 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     Ok(Recheck { pairs, skipped, strays, length_mm, causes, change, effect_mm, seen_mm })
 }
 
-/// The pairs that contradict the old rig by themselves, with the new board's shape and corners that scatter as those of the calibration did, or
-/// these more.
+/// The pairs that contradict the old rig by themselves, with the new board's shape and corners that scatter as those of
+/// the calibration did, or these more.
 fn strays(
     before: &Before,
     (solved, old): (&Solved, &Values),
@@ -158,7 +161,8 @@ fn strays(
     strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 
-/// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the other side.
+/// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to
+/// the other side.
 fn are_exchanged(problem: &Problem, board: &Board) -> bool {
     const SEVERAL: f64 = 4.0;
     let shared = &problem.values.shared;
@@ -170,9 +174,10 @@ fn are_exchanged(problem: &Problem, board: &Board) -> bool {
     })
 }
 
-/// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the pairs leave a bent valley,
-/// its two ends lie off the straight line along which the old rig is uncertain. The poses are those on the old rig: from those on another one a
-/// board may fall over to its mirrored pose. `None` where they say nothing.
+/// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the
+/// pairs leave a bent valley, its two ends lie off the straight line along which the old rig is uncertain. The poses
+/// are those on the old rig: from those on another one a board may fall over to its mirrored pose. `None` where they
+/// say nothing.
 fn step_from_old(solved: &Solved, old: &Values, layout: &Layout) -> Option<(DVector<f64>, DMatrix<f64>)> {
     let mut problem = Problem { values: old.clone(), ..solved.problem.clone() };
     for (pose, view) in problem.values.poses.iter_mut().zip(&problem.views) {
@@ -206,7 +211,8 @@ fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
 }
 
 impl Before {
-    /// The covariance of cameras and transform in the layout's order. `None` where the calibration has none of one of its numbers.
+    /// The covariance of cameras and transform in the layout's order. `None` where the calibration has none of one of
+    /// its numbers.
     fn covariance(&self, layout: &Layout) -> Option<DMatrix<f64>> {
         self.rig.covariance.as_ref()?.part(&layout.names()[..layout.shape_start()])
     }
@@ -231,7 +237,8 @@ impl Recheck {
         }
     }
 
-    /// What pairs mean that contradict the old rig by themselves, for a person, and what they are off by, mm; `None` where there are none.
+    /// What pairs mean that contradict the old rig by themselves, for a person, and what they are off by, mm; `None`
+    /// where there are none.
     pub fn contradiction(&self) -> Option<(String, f64)> {
         let said = || (strays::statement(&self.strays, &self.pairs, self.length_mm), strays::largest_mm(&self.strays));
         (!self.strays.is_empty()).then(said)

@@ -1,8 +1,9 @@
 //! Pairs that contradict an old rig by themselves: what few of them say is lost among the others.
 //!
-//! In: pairs at the old rig with their poses there. Out: those that no scatter of this rig explains, and how far a length is another one on the rig
-//! that each gives by itself, and in words what they say. Method: Rao's score tells which; the place of the right camera is then fitted to the pair
-//! alone, with the lenses of the old rig, until it settles. Goes wrong: pictures that are no pair give a rig that is none, and a size that is none.
+//! In: pairs at the old rig with their poses there. Out: those that no scatter of this rig explains, and how far a
+//! length is another one on the rig that each gives by itself, and in words what they say. Method: Rao's score tells
+//! which; the place of the right camera is then fitted to the pair alone, with the lenses of the old rig, until it
+//! settles. Goes wrong: pictures that are no pair give a rig that is none, and a size that is none.
 
 use nalgebra::DMatrix;
 use serde::Serialize;

@@ -70,7 +70,8 @@ fn a_pair_that_contradicts_the_others_is_named() {
         let found = recheck(&before, &corners).unwrap();
         let strays: Vec<&String> = found.strays.iter().map(|stray| &stray.pair).collect();
         assert_eq!(strays, [&corners.pairs[2].pair], "{turn_deg} deg: {}", found.statement());
-        // By as much as a rig that is so turned measures lengths otherwise; one pair alone tells that to some hundredths of a mm.
+        // By as much as a rig that is so turned measures lengths otherwise; one pair alone tells that to some
+        // hundredths of a mm.
         let (effect_mm, mut now) = (found.strays[0].effect_mm, before.rig.clone());
         turned(&mut now, turn_deg);
         let volume = before.volume.as_ref().unwrap();
@@ -111,8 +112,8 @@ fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
 #[test]
 #[ignore = "slow"]
 fn pairs_that_contradict_each_other_tell_no_absurd_change() {
-    // Boards that hardly lean, and one pair in three whose pictures were taken farther apart in time than the others': in one of these
-    // worlds the pairs' own rig has a focal length that is 4 % off.
+    // Boards that hardly lean, and one pair in three whose pictures were taken farther apart in time than the others':
+    // in one of these worlds the pairs' own rig has a focal length that is 4 % off.
     for seed in 87..90 {
         let before = by_hand(seed, 20, 1.0, 0.05);
         let apart_deg = [0.1, 0.2][seed as usize % 2];

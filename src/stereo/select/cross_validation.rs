@@ -1,10 +1,11 @@
 //! Rigs without some of the pairs, a step from the minimum of all of them.
 //!
-//! In: a problem at its minimum and the fold of every pair. Out: for each fold the shared numbers that the other pairs alone would give,
-//! and their covariance. Method: each pair's share of the normal equations, its pose eliminated, is taken off the sum, and one step of
-//! Gauss-Newton follows; from the minimum of all pairs that step is a fraction of a standard deviation, over which the equations are
-//! straight. Pairs with nearly the same pose are held out together ([`groups`], [`folds`]): one of two twins is no test of the other.
-//! Goes wrong: pairs that alone held a number of the rig; then the others do not determine it, and there is no rig.
+//! In: a problem at its minimum and the fold of every pair. Out: for each fold the shared numbers that the other pairs
+//! alone would give, and their covariance. Method: each pair's share of the normal equations, its pose eliminated, is
+//! taken off the sum, and one step of Gauss-Newton follows; from the minimum of all pairs that step is a fraction of a
+//! standard deviation, over which the equations are straight. Pairs with nearly the same pose are held out together
+//! ([`groups`], [`folds`]): one of two twins is no test of the other. Goes wrong: pairs that alone held a number of the
+//! rig; then the others do not determine it, and there is no rig.
 
 use nalgebra::{DMatrix, DVector, Point3};
 
@@ -17,8 +18,8 @@ use crate::stereo::solve::uncertainty::{self, worst_focal_sigma};
 /// Folds over the pairs; with fewer pairs each is a fold of its own.
 const FOLDS: usize = 10;
 
-/// Poses whose corners lie closer together than this share of the board's diagonal (root mean square) are one pose: between them the
-/// perspective changes by less than corners scatter.
+/// Poses whose corners lie closer together than this share of the board's diagonal (root mean square) are one pose:
+/// between them the perspective changes by less than corners scatter.
 const SAME_POSE: f64 = 0.03;
 
 /// The group of every pair: pairs with nearly the same pose are one group, numbered in the order of their first pairs.
@@ -27,7 +28,8 @@ pub fn groups(views: &[View], poses: &[Transform]) -> Vec<usize> {
     merge(&distances, |_, _, distance_mm| distance_mm < limit_mm, 1)
 }
 
-/// The fold of every pair, at most `FOLDS` of them: blocks of similar poses, no fold with more than about twice its share of the pairs.
+/// The fold of every pair, at most `FOLDS` of them: blocks of similar poses, no fold with more than about twice its
+/// share of the pairs.
 pub fn folds(views: &[View], poses: &[Transform]) -> Vec<usize> {
     let count = poses.len();
     let largest = 2 * count.div_ceil(FOLDS);
@@ -38,8 +40,8 @@ pub fn folds(views: &[View], poses: &[Transform]) -> Vec<usize> {
     if count <= FOLDS { merge(&distances, twins, 1) } else { merge(&distances, fits, FOLDS) }
 }
 
-/// Joins the nearest two clusters (complete linkage) that `may` be joined, by their sizes and distance, until `enough` are left. Where
-/// clusters are asked down to one, only `may` ends it.
+/// Joins the nearest two clusters (complete linkage) that `may` be joined, by their sizes and distance, until `enough`
+/// are left. Where clusters are asked down to one, only `may` ends it.
 fn merge(distances: &DMatrix<f64>, may: impl Fn(usize, usize, f64) -> bool, enough: usize) -> Vec<usize> {
     let count = distances.nrows();
     let mut clusters: Vec<Vec<usize>> = (0..count).map(|i| vec![i]).collect();
@@ -65,7 +67,8 @@ fn merge(distances: &DMatrix<f64>, may: impl Fn(usize, usize, f64) -> bool, enou
     of
 }
 
-/// Root mean square distance between any two poses of the outermost corners that were seen, mm, and that up to which two are one pose.
+/// Root mean square distance between any two poses of the outermost corners that were seen, mm, and that up to which
+/// two are one pose.
 fn distances_mm(views: &[View], poses: &[Transform]) -> (DMatrix<f64>, f64) {
     let all = views.iter().flat_map(|view| &view.observations);
     let [x, y] = all.fold([0.0, 0.0], |[x, y]: [f64; 2], o| [x.max(o.board_mm.x.abs()), y.max(o.board_mm.y.abs())]);
@@ -92,8 +95,9 @@ pub struct Without {
     pub shared: Shared,
 }
 
-/// The calibration without each fold. `None` for a fold without which the others do not determine both focal lengths to the share `focal_sigma` of
-/// them. The gradients change by `curvature`: the equations themselves, or those of a loss whose weights change with the residuals.
+/// The calibration without each fold. `None` for a fold without which the others do not determine both focal lengths to
+/// the share `focal_sigma` of them. The gradients change by `curvature`: the equations themselves, or those of a loss
+/// whose weights change with the residuals.
 pub fn leave_out(
     curvature: &Equations,
     equations: &Equations,

@@ -1,10 +1,11 @@
 //! The lenses of a rig whose pictures were not taken at one moment, from each camera's own pictures.
 //!
-//! In: the pairs at their start, how far each camera misses its own pictures and how far the pairs miss their rig. Out: both lenses with their
-//! covariance. Method: what moved between the two pictures of a pair says nothing of either lens, and each picture by itself is as good as
-//! ever; so each camera is solved alone, its board bent or flat. In the bundle of the pairs, whose corners then weigh by how far the pairs miss the
-//! rig, the same corners count once more by the square of the ratio of the two; by so much less the lenses are known. Goes wrong: boards that
-//! do not tell one of the cameras by itself; then no lens is known.
+//! In: the pairs at their start, how far each camera misses its own pictures and how far the pairs miss their rig. Out:
+//! both lenses with their covariance. Method: what moved between the two pictures of a pair says nothing of either
+//! lens, and each picture by itself is as good as ever; so each camera is solved alone, its board bent or flat. In the
+//! bundle of the pairs, whose corners then weigh by how far the pairs miss the rig, the same corners count once more by
+//! the square of the ratio of the two; by so much less the lenses are known. Goes wrong: boards that do not tell one of
+//! the cameras by itself; then no lens is known.
 
 use nalgebra::DMatrix;
 
@@ -19,8 +20,8 @@ use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Camera, Lens, Rig};
 
-/// Both cameras with this lens, as their own pictures tell it. `None` where these do not, or where the pairs, `paired` with the same lens, tell more
-/// than they; `missed` is what is known where the pairs tell no rig.
+/// Both cameras with this lens, as their own pictures tell it. `None` where these do not, or where the pairs, `paired`
+/// with the same lens, tell more than they; `missed` is what is known where the pairs tell no rig.
 pub fn lenses(
     start: &Problem,
     board: &Board,

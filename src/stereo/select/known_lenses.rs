@@ -1,12 +1,14 @@
 //! Lenses that are known: what is free beside them, and whether the pictures agree with them.
 //!
-//! In: the pairs at their start, and lenses from another calibration. Out: the layout with what is expected, and the test. Method: the
-//! lenses are expectations with their covariance, beside which the corners weigh as little as their pairs scatter, by themselves or in the earlier
-//! calibration; the board is bent where the evidence for that is larger. The test compares the known numbers
-//! with those that the pictures give by themselves: their difference against both covariances, the pictures' one enlarged by what pairs scatter
-//! ([`crate::difference`]). A focus alone is asked for, too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be known instead: another focus, left and right exchanged, another
-//! camera. One is named where what it leaves is chance, and beside it those that do nearly as well.
-//! Goes wrong: pictures that say little of a lens; then the test says how large a change of focus it would have seen.
+//! In: the pairs at their start, and lenses from another calibration. Out: the layout with what is expected, and the
+//! test. Method: the lenses are expectations with their covariance, beside which the corners weigh as little as their
+//! pairs scatter, by themselves or in the earlier calibration; the board is bent where the evidence for that is larger.
+//! The test compares the known numbers with those that the pictures give by themselves: their difference against both
+//! covariances, the pictures' one enlarged by what pairs scatter ([`crate::difference`]). A focus alone is asked for,
+//! too: it is what changes, and a test of one number sees smaller changes of it. Causes are other lenses that might be
+//! known instead: another focus, left and right exchanged, another camera. One is named where what it leaves is chance,
+//! and beside it those that do nearly as well. Goes wrong: pictures that say little of a lens; then the test says how
+//! large a change of focus it would have seen.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -21,15 +23,15 @@ use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::Problem;
 use crate::stereo::{Error, Rig};
 
-/// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is right: one set of pairs in a
-/// thousand is contradicted by one of them.
+/// Chance that one of the four tests (all numbers, the focus of either side and of both) contradicts a lens that is
+/// right: one set of pairs in a thousand is contradicted by one of them.
 const CHANCE: f64 = 2.5e-4;
 
 /// Whether the pictures agree with the lenses that were known.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LensCheck {
-    /// Squared difference of the known numbers from those that the pictures give, in units of its covariance: of all numbers, or the part
-    /// that a focus explains, whichever is the larger share of its limit.
+    /// Squared difference of the known numbers from those that the pictures give, in units of its covariance: of all
+    /// numbers, or the part that a focus explains, whichever is the larger share of its limit.
     pub chi_square: f64,
     /// Beyond it they contradict each other.
     pub limit: f64,
@@ -71,7 +73,8 @@ pub fn choose(start: &Problem, known: &KnownLenses, options: &Options) -> Result
     let problem = start_of(start, known);
     let (mut solved, layout) = problem.solve_bent_or_flat(options.shape, |shape| known.layout(lens, shape))?;
     let [scatter, _] = stated_uncertainty::scatter_beside(&solved, &layout, known.pair_excess, known.noise.as_ref());
-    // Corners weigh by their noise alone; beside them, what is known counts by as much more as the pairs scatter beyond it.
+    // Corners weigh by their noise alone; beside them, what is known counts by as much more as the pairs scatter beyond
+    // it.
     solved.problem.priors = start.priors.knowing(&known.weighing(scatter));
     let shape = options
         .shape

@@ -1,11 +1,12 @@
 //! Which lens model, and whether the board is flat: what predicts pairs that it has not seen.
 //!
-//! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k folds over the
-//! pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair it has not seen, and what is left counts. The simplest model whose
-//! loss is within two standard errors of the best wins (after Breiman et al. 1984), since a richer one extrapolates worse; unless the corners
-//! refute it: chi-squared falls by more than chance for a richer one that predicts no worse. What the board's print alone would let a term of no
-//! worth gain is allowed for in both. How much chance does, the richest lens tells that the pairs determine.
-//! Goes wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
+//! In: views that agree. Out: the layout to solve, and how each lens of the ladder predicts held-out pairs. Method: k
+//! folds over the pairs ([`crate::stereo::select::cross_validation`]); the rig of a fold measures the pose of each pair
+//! it has not seen, and what is left counts. The simplest model whose loss is within two standard errors of the best
+//! wins (after Breiman et al. 1984), since a richer one extrapolates worse; unless the corners refute it: chi-squared
+//! falls by more than chance for a richer one that predicts no worse. What the board's print alone would let a term of
+//! no worth gain is allowed for in both. How much chance does, the richest lens tells that the pairs determine. Goes
+//! wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
 use crate::imaging::Board;
@@ -20,9 +21,10 @@ use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
-/// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose pictures were not taken at one
-/// moment, the lenses are expected to be those; which model, the pairs say, where they say anything. `missed` is how far pictures are missed,
-/// where that may decide; `below` is a lens that turned out to be richer than the pairs determine.
+/// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose
+/// pictures were not taken at one moment, the lenses are expected to be those; which model, the pairs say, where they
+/// say anything. `missed` is how far pictures are missed, where that may decide; `below` is a lens that turned out to
+/// be richer than the pairs determine.
 pub fn choose(
     start: &Problem,
     missed: Option<Missed>,
@@ -94,10 +96,11 @@ fn print_excess(solved: &Solved, layout: &Layout, board: &Board) -> f64 {
     print_share(solved, board, layout).map_or(1.0, |print| print.excess)
 }
 
-/// The corners as the richest lens weighs them with which the pairs tell how they scatter, what is expected beside pairs that scatter so, and
-/// what chance does then, where a richer lens than the simplest was tried. What the simpler one lacks would else pass for scatter of the
-/// pairs, before which no term seems worth anything (Mallows, Technometrics 15, 1973, takes the variance from the full model for the same
-/// reason). At least half of what the pairs tell of a rig must be left to scatter.
+/// The corners as the richest lens weighs them with which the pairs tell how they scatter, what is expected beside
+/// pairs that scatter so, and what chance does then, where a richer lens than the simplest was tried. What the simpler
+/// one lacks would else pass for scatter of the pairs, before which no term seems worth anything (Mallows,
+/// Technometrics 15, 1973, takes the variance from the full model for the same reason). At least half of what the pairs
+/// tell of a rig must be left to scatter.
 fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &Board) -> Option<(Problem, Chance)> {
     /// Two standard deviations of the scatter of one pair that chance alone makes.
     const BY_CHANCE: f64 = 1.5;
@@ -119,11 +122,12 @@ fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &
     )
 }
 
-/// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts them, this one explains
-/// them and the pairs determine it. In wide pictures the simplest lens gives up the borders: corners there hardly count with it, and no lens
-/// would gain anything by them.
+/// The pairs as a lens with the rational terms leaves them, where many corners lie far from where the simplest one puts
+/// them, this one explains them and the pairs determine it. In wide pictures the simplest lens gives up the borders:
+/// corners there hardly count with it, and no lens would gain anything by them.
 fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<Solved> {
-    /// How many times the usual distance (root mean square of a normal distribution) marks residuals with borders given up.
+    /// How many times the usual distance (root mean square of a normal distribution) marks residuals with borders given
+    /// up.
     const FAR: f64 = 2.0;
     let usual_px = simplest.noise.typical_px(&simplest.problem.views) * 2f64.sqrt();
     if simplest.rms_px < FAR * usual_px {
@@ -137,9 +141,9 @@ fn of_wide_lens(start: &Problem, simplest: &Solved, layout: &Layout) -> Option<S
     (2.0 * gain > added + 2.0 * (2.0 * added).sqrt()).then_some(solved)
 }
 
-/// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence (Laplace's approximation; what is
-/// expected of the terms that it lacks is part of it) is larger. Corners that are measured well tell a term that is not there
-/// from one that is; hand-held pictures do not, and keep all of them.
+/// A lens of fewer terms than the simplest of the ladder, where the pairs say so: the logarithm of its evidence
+/// (Laplace's approximation; what is expected of the terms that it lacks is part of it) is larger. Corners that are
+/// measured well tell a term that is not there from one that is; hand-held pictures do not, and keep all of them.
 fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial> {
     if five.layout.left != Some(SIMPLEST) {
         return None;
@@ -151,18 +155,20 @@ fn fewer_terms(problem: &Problem, five: &Trial, chance: &Chance) -> Option<Trial
     (best.0 < 0.0).then_some(best.1)
 }
 
-/// What is expected of a lens that was asked for. Rational terms and radial ones are exchanged for each other where a lens bends little: where all of
-/// them are free and the pairs do not tell them apart, the terms after them do not need them.
+/// What is expected of a lens that was asked for. Rational terms and radial ones are exchanged for each other where a
+/// lens bends little: where all of them are free and the pairs do not tell them apart, the terms after them do not need
+/// them.
 fn priors_of_forced(start: &Problem, layout: &Layout) -> Priors {
     let holds = layout.left > Some(Lens::Rational8)
         && start.solve(layout).and_then(|solved| solved.covariance(layout)).is_err();
     if holds { start.priors.holding_rational() } else { start.priors.clone() }
 }
 
-/// The simplest lens and those that are richer, each from where the best before it ended: a richer lens begins as a simpler one. One that is
-/// expected to gain no more than chance cannot predict better, and is not tried. Rational terms that did not prove themselves
-/// are held at zero in the lenses after them, which would only carry them on along the valley where they are exchanged for the radial ones. `before`:
-/// the same with other weights; where lenses were tried then, they start from there.
+/// The simplest lens and those that are richer, each from where the best before it ended: a richer lens begins as a
+/// simpler one. One that is expected to gain no more than chance cannot predict better, and is not tried. Rational
+/// terms that did not prove themselves are held at zero in the lenses after them, which would only carry them on along
+/// the valley where they are exchanged for the radial ones. `before`: the same with other weights; where lenses were
+/// tried then, they start from there.
 fn ladder(problem: &Problem, shape: bool, chance: &Chance, before: &[LensScore]) -> Vec<LensScore> {
     let mut problem = problem.clone();
     let mut simpler: Option<Layout> = None;
@@ -190,8 +196,9 @@ fn ladder(problem: &Problem, shape: bool, chance: &Chance, before: &[LensScore])
     scores
 }
 
-/// Whether a richer lens can be expected to explain more than noise would let it: more than two standard deviations above the mean of
-/// a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined nothing is expected.
+/// Whether a richer lens can be expected to explain more than noise would let it: more than two standard deviations
+/// above the mean of a chi-square with as many degrees of freedom as it adds. Of a lens that cannot be determined
+/// nothing is expected.
 fn expects_gain(problem: &Problem, layout: &Layout, simpler: &Layout) -> bool {
     let start = problem.with_layout(layout);
     let expected = start.equations(layout).and_then(|equations| uncertainty::expected_decrease(&equations));

@@ -15,21 +15,22 @@ use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
 use crate::stereo::solve::{Equations, Loss, Priors, Problem};
 
-/// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance when the
-/// best of several is taken.
+/// Standard errors by which a richer model must predict better: one is what half of the useless terms reach by chance
+/// when the best of several is taken.
 const STANDARD_ERRORS: f64 = 2.0;
 
-/// Quantile of the normal distribution (one draw in four thousand) at whose level of chi-squared a simpler model is refuted: there are several
-/// rungs.
+/// Quantile of the normal distribution (one draw in four thousand) at whose level of chi-squared a simpler model is
+/// refuted: there are several rungs.
 const REFUTED: f64 = 3.5;
 
 /// By how much more than the corners' noise chance moves chi-squared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Chance {
-    /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least one.
+    /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole
+    /// pairs tell; at least one.
     pub scatter: f64,
-    /// Variance of the shared numbers with the board's print in it over that without; at least one. The print is the same in all pairs, so
-    /// that a term that takes it up predicts unseen pairs better, too.
+    /// Variance of the shared numbers with the board's print in it over that without; at least one. The print is the
+    /// same in all pairs, so that a term that takes it up predicts unseen pairs better, too.
     pub print: f64,
 }
 
@@ -37,7 +38,8 @@ pub struct Chance {
 pub const OF_PAIR: usize = 6;
 
 impl Chance {
-    /// With what so many numbers took up of the scatter of so few pairs. At most all of them go into where the pairs seem to see the right camera.
+    /// With what so many numbers took up of the scatter of so few pairs. At most all of them go into where the pairs
+    /// seem to see the right camera.
     pub fn with_taken_up(self, numbers: usize, pairs: usize) -> Chance {
         let all = (OF_PAIR * pairs) as f64;
         Chance { scatter: self.scatter * all / (all - numbers as f64), ..self }
@@ -58,7 +60,8 @@ impl Chance {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LensScore {
     pub model: &'static str,
-    /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens, or it promised nothing.
+    /// Root mean square of the held-out 2-D residuals, px; `None` where the pairs do not determine the lens, or it
+    /// promised nothing.
     pub held_out_rms_px: Option<f64>,
     /// Mean over the pairs of the squared whitened residual a corner.
     pub loss: Option<f64>,
@@ -78,7 +81,8 @@ pub struct Trial {
     pub priors: Priors,
     /// Covariance of rig and shape.
     pub covariance: DMatrix<f64>,
-    /// Sum of the squared whitened residuals of the pairs it was fitted to, and of what the lens misses of what is expected of lenses.
+    /// Sum of the squared whitened residuals of the pairs it was fitted to, and of what the lens misses of what is
+    /// expected of lenses.
     pub chi_square: f64,
     /// How many corners they are.
     corners: usize,
@@ -139,8 +143,9 @@ impl Trial {
         self.by_pair.iter().sum::<f64>() / self.by_pair.len() as f64
     }
 
-    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does (`REFUTED`): a
-    /// few pairs that miss terms only at their edges differ too much among themselves for their mean loss to tell.
+    /// Whether a richer model predicts unseen pairs no worse and lowers chi-squared by more than chance does
+    /// (`REFUTED`): a few pairs that miss terms only at their edges differ too much among themselves for their mean
+    /// loss to tell.
     pub fn is_refuted_by(&self, richer: &Trial, chance: &Chance) -> bool {
         let Some(added) = richer.layout.count().checked_sub(self.layout.count()).filter(|added| *added > 0) else {
             return false;
@@ -148,14 +153,16 @@ impl Trial {
         richer.loss() < self.loss() && self.chi_square - richer.chi_square > chance.fall(added)
     }
 
-    /// Whether it predicts unseen pairs worse than another model by more than chance and, where the other has more terms, print account for.
+    /// Whether it predicts unseen pairs worse than another model by more than chance and, where the other has more
+    /// terms, print account for.
     pub fn is_worse_than(&self, other: &Trial, chance: &Chance) -> bool {
         let added = other.layout.count().saturating_sub(self.layout.count());
         let by_print = if added > 0 { chance.print_fall(added) / self.corners.max(1) as f64 } else { 0.0 };
         self.excess_over(other) > by_print
     }
 
-    /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not held out.
+    /// How much worse than `best` beyond what chance makes of the pairs' differences; no number where pairs were not
+    /// held out.
     pub fn excess_over(&self, best: &Trial) -> f64 {
         let differences: Vec<f64> = self.by_pair.iter().zip(&best.by_pair).map(|(a, b)| a - b).collect();
         let n = differences.len() as f64;
@@ -165,8 +172,8 @@ impl Trial {
     }
 }
 
-/// Logarithm of the evidence for a richer model over a simpler one that it contains (Laplace's approximation; what is expected of the
-/// added terms is part of it). `scatter`: see [`Chance`]. `None` where a covariance has no volume.
+/// Logarithm of the evidence for a richer model over a simpler one that it contains (Laplace's approximation; what is
+/// expected of the added terms is part of it). `scatter`: see [`Chance`]. `None` where a covariance has no volume.
 pub fn gain_of_terms(priors: &Priors, richer: &Trial, simpler: &Trial, scatter: f64) -> Option<f64> {
     let added = (richer.layout.count() - simpler.layout.count()) as f64;
     let wider = 0.5 * (richer.log_volume()? - simpler.log_volume()? + added * scatter.ln());

@@ -5,8 +5,8 @@ use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
-/// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held by what is expected of
-/// lenses, so that nothing simpler is needed.
+/// The lens of all cameras whose pictures do not ask for more. What hand-held pictures leave open of its terms is held
+/// by what is expected of lenses, so that nothing simpler is needed.
 pub(super) const SIMPLEST: Lens = Lens::Brown5;
 
 /// What may be forced.

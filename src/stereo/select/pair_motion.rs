@@ -1,10 +1,12 @@
-//! How far the link of the two pictures is off the common rig from pair to pair, and what that does to the shared numbers.
+//! How far the link of the two pictures is off the common rig from pair to pair, and what that does to the shared
+//! numbers.
 //!
-//! In: the normal equations of all pairs at their minimum. Out: the covariance of the shared numbers by that motion alone. Method: of a board that
-//! is held by hand before cameras that are not triggered together, or of a right camera that is not clamped, each pair has a small motion of
-//! its own, drawn with a variance for each of the six numbers of `right_from_left`; the variances are the likeliest ones (expectation and
-//! maximisation, Dempster, Laird and Rubin 1977), and reach the shared numbers through the normal equations of the pairs. Goes wrong: pairs
-//! that do not tell the motion from their noise; its variances are then small.
+//! In: the normal equations of all pairs at their minimum. Out: the covariance of the shared numbers by that motion
+//! alone. Method: of a board that is held by hand before cameras that are not triggered together, or of a right camera
+//! that is not clamped, each pair has a small motion of its own, drawn with a variance for each of the six numbers of
+//! `right_from_left`; the variances are the likeliest ones (expectation and maximisation, Dempster, Laird and Rubin
+//! 1977), and reach the shared numbers through the normal equations of the pairs. Goes wrong: pairs that do not tell
+//! the motion from their noise; its variances are then small.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 
@@ -12,18 +14,20 @@ use crate::stereo::model::Layout;
 use crate::stereo::solve::normal_equations::{Block, Equations};
 use crate::stereo::solve::uncertainty::invert;
 
-/// Rounds after which variances that are there have settled, and those that are not have fallen to a few hundredths of what the noise
-/// hides.
+/// Rounds after which variances that are there have settled, and those that are not have fallen to a few hundredths of
+/// what the noise hides.
 const ROUNDS: usize = 100;
 
-/// What a pair tells of the shared numbers and of its own motion, in units of the noise: the information of the shared ones and their gradient.
+/// What a pair tells of the shared numbers and of its own motion, in units of the noise: the information of the shared
+/// ones and their gradient.
 struct Told {
     matrix: DMatrix<f64>,
     gradient: DVector<f64>,
 }
 
-/// Covariance of the shared numbers by the pairs' motions. `own` is the inverse of the normal equations, `inflation` the variance of the whitened
-/// residuals. `None` where the transform is not among the shared numbers or the pairs do not determine them.
+/// Covariance of the shared numbers by the pairs' motions. `own` is the inverse of the normal equations, `inflation`
+/// the variance of the whitened residuals. `None` where the transform is not among the shared numbers or the pairs do
+/// not determine them.
 pub fn covariance(equations: &Equations, layout: &Layout, own: &DMatrix<f64>, inflation: f64) -> Option<DMatrix<f64>> {
     let (pairs, variances) = told(equations, layout, inflation)?;
     let (at, variances) = (layout.transform_start(), Matrix6::from_diagonal(&variances));
@@ -35,7 +39,8 @@ pub fn covariance(equations: &Equations, layout: &Layout, own: &DMatrix<f64>, in
     Some(&own * by_motion * &own)
 }
 
-/// Variances of the six numbers from pair to pair, and those by which a pair usually tells them. `inflation` is as for [`covariance`].
+/// Variances of the six numbers from pair to pair, and those by which a pair usually tells them. `inflation` is as for
+/// [`covariance`].
 pub fn of_pairs(equations: &Equations, layout: &Layout, inflation: f64) -> Option<[Vector6<f64>; 2]> {
     let (pairs, variances) = told(equations, layout, inflation)?;
     Some([variances, by_noise(&pairs, layout.transform_start())])
@@ -64,8 +69,8 @@ fn by_noise(pairs: &[Told], at: usize) -> Vector6<f64> {
     known.map(|known| pairs.len() as f64 / known)
 }
 
-/// The likeliest variances of the six numbers from pair to pair, what the shared numbers take up of the motions allowed for (restricted
-/// likelihood). The six begin with number `at` of the shared ones.
+/// The likeliest variances of the six numbers from pair to pair, what the shared numbers take up of the motions allowed
+/// for (restricted likelihood). The six begin with number `at` of the shared ones.
 fn variances(pairs: &[Told], prior: &Told, at: usize) -> Option<Vector6<f64>> {
     let count = pairs.len() as f64;
     let mut variances = by_noise(pairs, at);

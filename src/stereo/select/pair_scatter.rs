@@ -1,13 +1,16 @@
-//! Do the pairs scatter about the common rig as much as their corners' noise lets expect, and the covariance that allows for more.
+//! Do the pairs scatter about the common rig as much as their corners' noise lets expect, and the covariance that
+//! allows for more.
 //!
-//! In: the normal equations of all pairs at their minimum, the groups of pairs with nearly the same pose, and the covariance by the corners'
-//! noise. Out: the ratio of the scatter found to the one expected, and the covariance. Method: the jackknife over groups (the
-//! group-clustered sandwich with its small-sample correction, CR3 of Bell and McCaffrey 2002) holds whatever hangs together within
-//! a pair: a lens, a board or light that the model lacks. With heavy tails a group that goes also changes what the others' corners weigh; the
-//! curvature of the loss has that in it (the M-estimator's sandwich, Huber 1981, section 7.6). Some ten groups know a scatter in some twenty directions badly, so that it is
-//! shrunk towards what the corners' noise and a motion of each pair's own ([`pair_motion`]) would give, at the scatter's own size (Ledoit
-//! and Wolf 2004), and taken only where it is larger than what these two give.
-//! Goes wrong: groups without which the others do not determine the cameras; then there is no ratio, and nothing is enlarged.
+//! In: the normal equations of all pairs at their minimum, the groups of pairs with nearly the same pose, and the
+//! covariance by the corners' noise. Out: the ratio of the scatter found to the one expected, and the covariance.
+//! Method: the jackknife over groups (the group-clustered sandwich with its small-sample correction, CR3 of Bell and
+//! McCaffrey 2002) holds whatever hangs together within a pair: a lens, a board or light that the model lacks. With
+//! heavy tails a group that goes also changes what the others' corners weigh; the curvature of the loss has that in it
+//! (the M-estimator's sandwich, Huber 1981, section 7.6). Some ten groups know a scatter in some twenty directions
+//! badly, so that it is shrunk towards what the corners' noise and a motion of each pair's own ([`pair_motion`]) would
+//! give, at the scatter's own size (Ledoit and Wolf 2004), and taken only where it is larger than what these two give.
+//! Goes wrong: groups without which the others do not determine the cameras; then there is no ratio, and nothing is
+//! enlarged.
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -21,8 +24,8 @@ use crate::stereo::solve::Equations;
 pub struct PairScatter {
     /// Groups of pairs with poses of their own.
     pub groups: usize,
-    /// Variance of the shared numbers by the groups' scatter over the one by the corners' noise, mean over all directions; `None` where
-    /// not every group can be left out.
+    /// Variance of the shared numbers by the groups' scatter over the one by the corners' noise, mean over all
+    /// directions; `None` where not every group can be left out.
     pub ratio: Option<f64>,
 }
 
@@ -45,8 +48,8 @@ pub struct Jackknife<'a> {
 }
 
 impl Jackknife<'_> {
-    /// The covariance of the shared numbers that allows for how the groups scatter; `by_noise` is the one by the corners' noise, `inflation` the
-    /// factor in it over the normal equations' own.
+    /// The covariance of the shared numbers that allows for how the groups scatter; `by_noise` is the one by the
+    /// corners' noise, `inflation` the factor in it over the normal equations' own.
     pub fn covariance(&self, by_noise: &DMatrix<f64>, inflation: f64) -> (DMatrix<f64>, PairScatter) {
         let groups = self.without.len();
         let all: Option<Vec<&Without>> = self.without.iter().map(Option::as_ref).collect();
@@ -91,7 +94,8 @@ impl Jackknife<'_> {
         let ratio = scatter.trace() / n as f64 / stretch;
         let moved = pair_motion::covariance(self.equations, self.layout, &own, inflation);
         let by_motion = moved.map_or(DMatrix::zeros(n, n), |moved| &inverse_root * moved * inverse_root.transpose());
-        // What is expected counts by the factor beside the corners, so that it is known as much worse than the equations say.
+        // What is expected counts by the factor beside the corners, so that it is known as much worse than the
+        // equations say.
         let more = (self.lenses - self.least) / inflation;
         let by_lenses = root.transpose() * &self.equations.prior.matrix * &root * more;
         let floor = DMatrix::identity(n, n) * self.least + by_lenses + &by_motion;
@@ -107,9 +111,9 @@ impl Jackknife<'_> {
     }
 }
 
-/// Projection on the directions that the rig without a group knows hardly worse than the one with it; `covariance` is its in units of the
-/// latter's. What a group alone tells (the distortion at a border that one pair reaches) no other pair checks: without it those numbers go
-/// anywhere, and a step there says nothing of how pairs scatter.
+/// Projection on the directions that the rig without a group knows hardly worse than the one with it; `covariance` is
+/// its in units of the latter's. What a group alone tells (the distortion at a border that one pair reaches) no other
+/// pair checks: without it those numbers go anywhere, and a step there says nothing of how pairs scatter.
 fn told_by_others(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     /// Most by which the variance grows in a direction that the others tell, too.
     const MOST_GROWTH: f64 = 100.0;
@@ -124,7 +128,8 @@ fn reduced(equations: &Equations) -> Option<Vec<DMatrix<f64>>> {
     equations.blocks.iter().map(|block| Some(block.reduced(0.0)?.0)).collect()
 }
 
-/// The scatter matrix of some samples shrunk towards the multiple of `shape` with the same trace, by as much as its own scatter says.
+/// The scatter matrix of some samples shrunk towards the multiple of `shape` with the same trace, by as much as its own
+/// scatter says.
 fn shrunk(scatter: &DMatrix<f64>, samples: &[DVector<f64>], shape: DMatrix<f64>) -> DMatrix<f64> {
     let target = &shape * (scatter.trace() / shape.trace());
     let distance = (scatter - &target).norm_squared();

@@ -1,10 +1,11 @@
 //! The covariance that is stated: by the corners' noise, by how the pairs scatter, and by what richer models say.
 //!
-//! In: a problem at its minimum, the model, how the lenses that were tried predict held-out pairs. Out: the covariance, how the pairs scatter, and the
-//! richer models that are witnesses of another rig. A covariance assumes that its model is right. A richer model (a lens with more
-//! terms, a board that is not flat) that was not chosen, because it predicts no better, may yet be right: where its additional terms are more
-//! than chance at the level of a strict test, the step from the chosen model to it is taken as a bias that is known to its own size,
-//! and the square of that step is added (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
+//! In: a problem at its minimum, the model, how the lenses that were tried predict held-out pairs. Out: the covariance,
+//! how the pairs scatter, and the richer models that are witnesses of another rig. A covariance assumes that its model
+//! is right. A richer model (a lens with more terms, a board that is not flat) that was not chosen, because it predicts
+//! no better, may yet be right: where its additional terms are more than chance at the level of a strict test, the step
+//! from the chosen model to it is taken as a bias that is known to its own size, and the square of that step is added
+//! (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -19,8 +20,8 @@ use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
 use crate::stereo::solve::{Problem, Solved};
 use crate::stereo::{Lens, Rig};
 
-/// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean set of pairs in two hundred
-/// has such a witness.
+/// Quantile of the normal distribution at whose level of chi-squared additional terms are more than chance: one clean
+/// set of pairs in two hundred has such a witness.
 const MORE_THAN_CHANCE: f64 = 2.6;
 
 /// A richer model whose additional terms are more than chance.
@@ -37,9 +38,9 @@ pub struct Witness {
     step: DVector<f64>,
 }
 
-/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers scatter by where lenses are
-/// `known` at least; with how the pairs scatter, and the richer models that are witnesses of another rig. `print_excess`: see
-/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers
+/// scatter by where lenses are `known` at least; with how the pairs scatter, and the richer models that are witnesses
+/// of another rig. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
@@ -57,7 +58,8 @@ pub fn state(
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(lenses);
     let richer = richer(layout, scores, known.is_some());
     let witnesses = witnesses(&solved.problem, layout, richer, factor * print_excess);
-    // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the likeliest. The board's is another.
+    // Lenses contain each other: the steps to two of them are not two biases, and Akaike's criterion names the
+    // likeliest. The board's is another.
     let gain = |w: &&Witness| w.chi_square_fall - 2.0 * w.added as f64;
     let lenses = witnesses.iter().filter(|w| w.layout.left != layout.left);
     let likeliest = lenses.max_by(|a, b| gain(a).total_cmp(&gain(b)));
@@ -67,8 +69,8 @@ pub fn state(
     (covariance, pair_scatter, witnesses)
 }
 
-/// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs tell; at least that of the
-/// corners. `None` where the pairs do not tell how they scatter.
+/// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs
+/// tell; at least that of the corners. `None` where the pairs do not tell how they scatter.
 pub fn told_scatter(solved: &Solved, layout: &Layout) -> Option<f64> {
     let inflation = solved.inflation();
     let by_noise = solved.covariance(layout).ok()? * inflation;
@@ -81,8 +83,8 @@ pub fn excess_scatter(solved: &Solved, layout: &Layout) -> f64 {
     told_scatter(solved, layout).unwrap_or_else(|| solved.inflation())
 }
 
-/// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of the rig knows it, whichever is
-/// larger, and the same over what their corners' noise lets expect.
+/// Variance of the numbers over that of the weighted normal equations, by these pairs or as an earlier calibration of
+/// the rig knows it, whichever is larger, and the same over what their corners' noise lets expect.
 pub fn scatter_beside(solved: &Solved, layout: &Layout, pair_excess: f64, noise: Option<&Noise>) -> [f64; 2] {
     let scatter = excess_scatter(solved, layout).max(pair_excess) * solved.noise_of(noise);
     [scatter, scatter / solved.inflation()]
@@ -120,8 +122,8 @@ fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f6
     richer.into_iter().filter_map(witness).collect()
 }
 
-/// The richer models that are asked: lenses that the pairs determine and that do not predict held-out pairs worse, or, where the lens was
-/// forced, the ladder up to eight terms, and none where it is known; and a board that is not flat.
+/// The richer models that are asked: lenses that the pairs determine and that do not predict held-out pairs worse, or,
+/// where the lens was forced, the ladder up to eight terms, and none where it is known; and a board that is not flat.
 fn richer(layout: &Layout, scores: &[LensScore], lenses_known: bool) -> Vec<Layout> {
     let Some(own) = layout.left else { return Vec::new() };
     let trial = |lens: Lens| scores.iter().filter_map(|s| s.trial.as_ref()).find(|t| t.layout.left == Some(lens));

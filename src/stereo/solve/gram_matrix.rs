@@ -1,8 +1,8 @@
 //! Sums of the products of all columns of a tall narrow matrix, `J' J`, rows coming in one after another.
 //!
-//! In: rows of at most [`WIDEST`] numbers. Out: the upper triangle of `J' J`. Method: four rows at a time, so that each sum is
-//! fetched and stored once for four products. The order of summation depends on nothing but the rows, so that the bits do not
-//! depend on threads or on the processor.
+//! In: rows of at most [`WIDEST`] numbers. Out: the upper triangle of `J' J`. Method: four rows at a time, so that each
+//! sum is fetched and stored once for four products. The order of summation depends on nothing but the rows, so that
+//! the bits do not depend on threads or on the processor.
 
 use crate::widest::widest;
 

@@ -1,10 +1,10 @@
 //! The bundle: one weighted, robust least squares over the shared numbers and a pose a pair.
 //!
 //! In: views with whitened corners, starting values. Out: the values at the minimum, why the search stopped, and the
-//! covariance. Method: Levenberg-Marquardt with Marquardt's scaling; the poses are eliminated (see [`crate::stereo::solve::normal_equations`]).
-//! Blocks are computed in parallel and summed in the order of the pairs, so that the bytes do not depend on the threads.
-//! Goes wrong: a start so far off that a board would have to pass through a camera; unknowns that the views do not determine
-//! (no covariance then).
+//! covariance. Method: Levenberg-Marquardt with Marquardt's scaling; the poses are eliminated (see
+//! [`crate::stereo::solve::normal_equations`]). Blocks are computed in parallel and summed in the order of the pairs,
+//! so that the bytes do not depend on the threads. Goes wrong: a start so far off that a board would have to pass
+//! through a camera; unknowns that the views do not determine (no covariance then).
 
 use std::collections::VecDeque;
 
@@ -20,11 +20,12 @@ use crate::stereo::solve::{Equations, Loss, Priors};
 /// The search is done when even a strongly damped step does not lower the cost.
 const MAX_DAMPING: f64 = 1e12;
 
-/// Numbers of a rich lens that only the corners farthest out tell apart are eleven orders of magnitude weaker than the others: more damping
-/// than this would slow them down, less is lost in rounding.
+/// Numbers of a rich lens that only the corners farthest out tell apart are eleven orders of magnitude weaker than the
+/// others: more damping than this would slow them down, less is lost in rounding.
 const LEAST_DAMPING: f64 = 1e-14;
 
-/// So many last steps that together lower half of chi-squared by less than this have moved nothing by a seventh of its standard deviation.
+/// So many last steps that together lower half of chi-squared by less than this have moved nothing by a seventh of its
+/// standard deviation.
 const LATELY: usize = 20;
 const NO_MATTER: f64 = 0.01;
 
@@ -50,10 +51,12 @@ impl Search {
     pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-7, most_steps: 50 };
     /// From a minimum of nearly the same problem to the limit of rounding.
     pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 400 };
-    /// The same with a robust loss, whose curvature the equations overestimate: more steps, to a thousandth of a standard deviation.
+    /// The same with a robust loss, whose curvature the equations overestimate: more steps, to a thousandth of a
+    /// standard deviation.
     pub const ROBUST: Search = Search { first_damping: 1e-9, cost_share: 1e-10, most_steps: 100 };
-    /// From a minimum of nearly the same problem to a hundredth of a standard deviation: a model on trial. A tilted sensor, its centre and its prism
-    /// are exchanged for each other along a bent valley of up to two hundred steps; what creeps on for longer is no model that these views determine.
+    /// From a minimum of nearly the same problem to a hundredth of a standard deviation: a model on trial. A tilted
+    /// sensor, its centre and its prism are exchanged for each other along a bent valley of up to two hundred steps;
+    /// what creeps on for longer is no model that these views determine.
     pub const TRIAL: Search = Search { first_damping: 1e-9, cost_share: 1e-8, most_steps: 300 };
 }
 
@@ -64,8 +67,9 @@ pub enum Stop {
     Minimum,
     /// After the largest number of steps, the last of which lowered the cost by nothing that matters.
     Valley,
-    /// Elsewhere: after the largest number of steps; where not even a strongly damped step lowers the cost though the equations promise that one
-    /// does, as it jumps there; or at the start, with a corner behind its camera or views that do not determine the poses.
+    /// Elsewhere: after the largest number of steps; where not even a strongly damped step lowers the cost though the
+    /// equations promise that one does, as it jumps there; or at the start, with a corner behind its camera or views
+    /// that do not determine the poses.
     Elsewhere,
 }
 
@@ -117,7 +121,8 @@ pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, lo
             damping *= rise;
             rise *= 10.0;
             if damping > MAX_DAMPING {
-                // No step lowers the cost, however short: a minimum but for rounding, unless the equations still promise something.
+                // No step lowers the cost, however short: a minimum but for rounding, unless the equations still
+                // promise something.
                 let promised =
                     try_step(layout, &values, &equations, search.first_damping).map_or(f64::INFINITY, |s| s.1);
                 let minimum = promised < NO_MATTER.max(ROUNDING * cost);
@@ -126,7 +131,8 @@ pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, lo
             }
         }
     }
-    // Numbers of a rich lens that nothing tells apart make a valley without an end; along it nothing changes that matters.
+    // Numbers of a rich lens that nothing tells apart make a valley without an end; along it nothing changes that
+    // matters.
     let gained = lately.front().map_or(f64::INFINITY, |before| before - cost);
     let stop = if lately.len() > LATELY && gained < NO_MATTER { Stop::Valley } else { Stop::Elsewhere };
     Solution { values, cost, stop, steps: search.most_steps }
@@ -140,7 +146,8 @@ struct Attempt {
     predicted_gain: f64,
 }
 
-/// A step from these values with their equations and cost. `None` where the equations have no solution with this damping.
+/// A step from these values with their equations and cost. `None` where the equations have no solution with this
+/// damping.
 fn attempt(
     of: &impl Fn(&Values) -> Option<Equations>,
     layout: &Layout,
@@ -160,8 +167,8 @@ fn attempt(
     Some(reached)
 }
 
-/// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak directions
-/// where the residuals bend: the gain is small then, and more damping converges faster.
+/// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak
+/// directions where the residuals bend: the gain is small then, and more damping converges faster.
 fn damping_change(share: f64) -> f64 {
     match share {
         s if s > 0.75 => 0.1,

@@ -1,4 +1,5 @@
-//! The search for the most likely rig: one weighted, robust least squares over the rig, the board's shape and a pose a pair.
+//! The search for the most likely rig: one weighted, robust least squares over the rig, the board's shape and a pose a
+//! pair.
 
 mod gram_matrix;
 pub mod levenberg_marquardt;

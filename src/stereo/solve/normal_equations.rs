@@ -1,8 +1,8 @@
 //! The normal equations of the bundle, with each board's pose eliminated.
 //!
-//! The matrix is an arrow: every pair touches the shared numbers and its own pose, never another's. With
-//! `H = [A B; B' C]` a pair contributes `A - B C^-1 B'` to the shared system (Triggs et al. 2000, section 6.1), so that a
-//! dense system of some forty unknowns remains however many pairs there are.
+//! The matrix is an arrow: every pair touches the shared numbers and its own pose, never another's. With `H = [A B; B'
+//! C]` a pair contributes `A - B C^-1 B'` to the shared system (Triggs et al. 2000, section 6.1), so that a dense
+//! system of some forty unknowns remains however many pairs there are.
 
 use nalgebra::{DMatrix, DVector, Matrix2x3, Matrix3, Matrix6, Point3, RowVector3, Vector2, Vector3, Vector6};
 
@@ -230,7 +230,8 @@ impl Block {
         }
     }
 
-    /// What the pair says about the shared numbers with its own pose eliminated: `A - B C^-1 B'` and the gradient that goes with it.
+    /// What the pair says about the shared numbers with its own pose eliminated: `A - B C^-1 B'` and the gradient that
+    /// goes with it.
     pub fn reduced(&self, damping: f64) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let through = &self.mixed * self.pose_inverse(damping)?;
         Some((&self.shared - &through * self.mixed.transpose(), &self.shared_gradient - &through * self.pose_gradient))

@@ -1,9 +1,11 @@
-//! What is known of lenses, picture centres and boards before any picture: weak, so that it decides only where pictures do not.
+//! What is known of lenses, picture centres and boards before any picture: weak, so that it decides only where pictures
+//! do not.
 //!
-//! In: a rig to start from, and the size of the board. Out: expectations, each a sum of the shared numbers with a value and a standard
-//! deviation, and their share of the normal equations. Hand-held pictures often leave two or three terms of a lens open; without an
-//! expectation these run off and spoil what lies beside the boards. The widths are generous for built cameras (27 public
-//! sets of webcams and phones keep within them), and next to nothing beside corners that are measured well.
+//! In: a rig to start from, and the size of the board. Out: expectations, each a sum of the shared numbers with a value
+//! and a standard deviation, and their share of the normal equations. Hand-held pictures often leave two or three terms
+//! of a lens open; without an expectation these run off and spoil what lies beside the boards. The widths are generous
+//! for built cameras (27 public sets of webcams and phones keep within them), and next to nothing beside corners that
+//! are measured well.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -14,7 +16,8 @@ use crate::stereo::{Camera, Lens, Rig};
 
 /// What distortion does at the corner of the picture, as shares of the corner's distance from the middle: k1, k2, k3.
 const RADIAL_AT_CORNER: [f64; 3] = [0.2, 0.1, 0.05];
-/// What the rational terms do there, k4, k5, k6: these and the radial ones are exchanged for each other, so that one of the two is held.
+/// What the rational terms do there, k4, k5, k6: these and the radial ones are exchanged for each other, so that one of
+/// the two is held.
 const RATIONAL_AT_CORNER: [f64; 3] = [1.0, 1.0, 1.0];
 /// Tangential distortion, p1 and p2.
 const TANGENTIAL: f64 = 1e-3;
@@ -22,8 +25,9 @@ const TANGENTIAL: f64 = 1e-3;
 const PRISM: f64 = 2e-3;
 /// By how much a sensor is tilted, rad: more than any that is not meant to be.
 const TILT_RAD: f64 = 0.05;
-/// Focal lengths as shares of the picture's longer side, and by what factor most differ from it: 25 degrees across to 80. So wide that it
-/// holds nothing that pictures tell; it keeps boards that all lie alike from a camera that has no focal length at all.
+/// Focal lengths as shares of the picture's longer side, and by what factor most differ from it: 25 degrees across to
+/// 80. So wide that it holds nothing that pictures tell; it keeps boards that all lie alike from a camera that has no
+/// focal length at all.
 const FOCAL_SHARE: f64 = 1.2;
 const FOCAL_FACTOR: f64 = 2.0;
 /// How far the picture's centre lies from its middle, as a share of the width.
@@ -31,7 +35,8 @@ const CENTRE_SHARE: f64 = 0.015;
 /// By how much fx and fy differ; pixels whose sides differ by more than the second number are not meant to be square.
 const ASPECT: f64 = 0.005;
 const NOT_SQUARE: f64 = 0.03;
-/// By how much two cameras of one make differ in focal length; cameras that differ by more than the second number are of two makes.
+/// By how much two cameras of one make differ in focal length; cameras that differ by more than the second number are
+/// of two makes.
 const ALIKE: f64 = 0.01;
 const TWO_MAKES: f64 = 0.05;
 /// By how much a board bends, as a share of its diagonal.
@@ -109,15 +114,16 @@ impl Priors {
         priors
     }
 
-    /// The same with the rational terms held at zero: what a lens needs of the terms after these shows without them, where all together
-    /// are not told apart.
+    /// The same with the rational terms held at zero: what a lens needs of the terms after these shows without them,
+    /// where all together are not told apart.
     pub fn holding_rational(&self) -> Priors {
         Priors { rational_held: true, ..self.clone() }
     }
 
-    /// The same beside corners that count so many times as much as the pairs bear out, as a variance: pairs that scatter by more than their
-    /// corners do tell of the terms of richer lenses as much less, and what these usually are decides as much more; a sensor would else be tilted
-    /// by five degrees to take up a hand that moved. The terms that all lenses have, the pairs tell for all that.
+    /// The same beside corners that count so many times as much as the pairs bear out, as a variance: pairs that
+    /// scatter by more than their corners do tell of the terms of richer lenses as much less, and what these usually
+    /// are decides as much more; a sensor would else be tilted by five degrees to take up a hand that moved. The terms
+    /// that all lenses have, the pairs tell for all that.
     pub fn beside(&self, scatter: f64) -> Priors {
         Priors { weight: scatter.max(1.0), ..self.clone() }
     }
@@ -146,7 +152,8 @@ impl Priors {
         self.all.iter().any(|expectation| expectation.known)
     }
 
-    /// Sum of the logarithms of the standard deviations of those numbers that a richer layout has and a simpler one has not.
+    /// Sum of the logarithms of the standard deviations of those numbers that a richer layout has and a simpler one has
+    /// not.
     pub fn log_width(&self, richer: &Layout, simpler: &Layout) -> f64 {
         let free = |layout: &Layout, expectation: &&Expectation| {
             expectation.terms.iter().all(|(number, _)| self.place(layout, *number, expectation.known).is_some())
@@ -187,8 +194,8 @@ impl Priors {
         self.all.extend((0..board_shape::NUMBERS).map(flat));
     }
 
-    /// Their share of the normal equations. Expectations of numbers that are not free say nothing; nor do those of single distortion
-    /// terms where the lens has the rational terms that these are exchanged for.
+    /// Their share of the normal equations. Expectations of numbers that are not free say nothing; nor do those of
+    /// single distortion terms where the lens has the rational terms that these are exchanged for.
     pub fn information(&self, layout: &Layout, shared: &Shared) -> Information {
         /// Small enough to hold a number, and large enough for the equations.
         const HELD: f64 = 1e-6;

@@ -1,7 +1,8 @@
 //! A calibration as a least-squares problem: views, values to start from, and which numbers are free.
 //!
-//! In: views that agree and values near their minimum. Out: the values at the minimum, how corners scatter, and what each weighs. Method: a robust search, then the likeliest scatter of the corners, whose tails follow from the data, together with weak
-//! expectations of what lenses and boards are like ([`crate::stereo::solve::priors`]).
+//! In: views that agree and values near their minimum. Out: the values at the minimum, how corners scatter, and what
+//! each weighs. Method: a robust search, then the likeliest scatter of the corners, whose tails follow from the data,
+//! together with weak expectations of what lenses and boards are like ([`crate::stereo::solve::priors`]).
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 
@@ -59,8 +60,8 @@ impl Problem {
         problem
     }
 
-    /// Solves robustly, then with the likeliest scatter of the corners, Gaussian or with heavy tails. No corner is thrown away: what lies far
-    /// off counts little, and its whitener says so afterwards.
+    /// Solves robustly, then with the likeliest scatter of the corners, Gaussian or with heavy tails. No corner is
+    /// thrown away: what lies far off counts little, and its whitener says so afterwards.
     pub fn solve(&self, layout: &Layout) -> Result<Solved, Error> {
         let mut problem = self.with_layout(layout);
         let unknowns = layout.count() + 6 * problem.views.len();
@@ -75,7 +76,8 @@ impl Problem {
         problem.solve_near(layout)
     }
 
-    /// The same with the board's shape free or not, as it is forced, or else free where the pairs tell it; with the layout that was solved.
+    /// The same with the board's shape free or not, as it is forced, or else free where the pairs tell it; with the
+    /// layout that was solved.
     pub fn solve_bent_or_flat(
         &self,
         forced: Option<bool>,
@@ -103,7 +105,8 @@ impl Problem {
         others
     }
 
-    /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one lies behind its camera.
+    /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one
+    /// lies behind its camera.
     pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
         Noise::from_median(&residuals::active(&self.views, &self.values)?).apply(&mut self.views);
         self.values = self.search(layout, Loss::Cauchy, Search::ROUGH).values;
@@ -157,8 +160,8 @@ impl Problem {
         Ok(Solved { problem, noise, loss, loss_factor, log_likelihood, rms_px })
     }
 
-    /// Solves again by least squares with the weights and outliers as they are: for folds. `None` where the search does not
-    /// end at a minimum: these pairs do not determine this lens.
+    /// Solves again by least squares with the weights and outliers as they are: for folds. `None` where the search does
+    /// not end at a minimum: these pairs do not determine this lens.
     pub fn refit(&self, layout: &Layout) -> Option<Values> {
         let solution = self.with_layout(layout).search(layout, Loss::Squared, Search::TRIAL);
         (solution.stop == Stop::Minimum).then_some(solution.values)
@@ -171,7 +174,8 @@ impl Problem {
 }
 
 impl Solved {
-    /// Variance of the unknowns over what the weighted normal equations say: what neighbouring corners share, and the loss.
+    /// Variance of the unknowns over what the weighted normal equations say: what neighbouring corners share, and the
+    /// loss.
     pub fn inflation(&self) -> f64 {
         self.problem.neighbours().inflation() * self.loss_factor
     }
@@ -189,7 +193,8 @@ impl Solved {
         }
     }
 
-    /// The normal equations with the loss's own curvature: along its residual a corner's gradient changes by less than its weight.
+    /// The normal equations with the loss's own curvature: along its residual a corner's gradient changes by less than
+    /// its weight.
     pub fn curvature(&self, layout: &Layout) -> Option<Equations> {
         let mut curved = self.problem.clone();
         for (view, pose) in curved.views.iter_mut().zip(&curved.values.poses) {
@@ -206,8 +211,9 @@ impl Solved {
         curved.equations(layout)
     }
 
-    /// Variance of the corners about an earlier calibration over that of these pairs; at least one. A few pairs of a board that is held by hand
-    /// take up much of what pictures of the rig miss it by, and seem to scatter less than they do.
+    /// Variance of the corners about an earlier calibration over that of these pairs; at least one. A few pairs of a
+    /// board that is held by hand take up much of what pictures of the rig miss it by, and seem to scatter less than
+    /// they do.
     pub fn noise_of(&self, earlier: Option<&Noise>) -> f64 {
         let px = |noise: &Noise| noise.typical_px(&self.problem.views);
         earlier.map_or(1.0, |earlier| (px(earlier) / px(&self.noise)).powi(2).max(1.0))
@@ -223,8 +229,8 @@ fn unseen() -> Error {
     Error::NotConverged { steps: 0 }
 }
 
-/// The values where a search ended at a minimum. A lens that was asked for may have numbers that these views do not tell apart; the covariance
-/// says which.
+/// The values where a search ended at a minimum. A lens that was asked for may have numbers that these views do not
+/// tell apart; the covariance says which.
 fn converged(solution: Solution) -> Result<Values, Error> {
     match solution.stop {
         Stop::Minimum | Stop::Valley => Ok(solution.values),

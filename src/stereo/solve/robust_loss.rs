@@ -29,8 +29,8 @@ impl Loss {
         }
     }
 
-    /// Slope of the gradient along a residual over its weight, at least zero; `weighed` is the squared residual times the weight. Far off a
-    /// corner counts less the farther off it is.
+    /// Slope of the gradient along a residual over its weight, at least zero; `weighed` is the squared residual times
+    /// the weight. Far off a corner counts less the farther off it is.
     pub fn slope_along(self, weighed: f64) -> f64 {
         match self {
             Loss::Squared => 1.0,
@@ -39,8 +39,9 @@ impl Loss {
         }
     }
 
-    /// Variance of an estimate over the inverse of the weighted normal equations, `J' W J` with the weights that these squared residuals
-    /// have: the sandwich of an M-estimator with two-dimensional residuals (Huber 1981, section 7.6). One for least squares.
+    /// Variance of an estimate over the inverse of the weighted normal equations, `J' W J` with the weights that these
+    /// squared residuals have: the sandwich of an M-estimator with two-dimensional residuals (Huber 1981, section 7.6).
+    /// One for least squares.
     pub fn variance_factor(self, squares: impl Iterator<Item = f64>) -> f64 {
         let Loss::Student(freedom) = self else { return 1.0 };
         let (mut count, mut weights, mut bread, mut meat) = (0.0, 0.0, 0.0, 0.0);
@@ -86,7 +87,8 @@ mod tests {
 
     #[test]
     fn the_variance_factor_is_that_of_an_estimated_mean() {
-        // The mean of points in a plane with Student's distribution: its variance over many draws against the stated one.
+        // The mean of points in a plane with Student's distribution: its variance over many draws against the stated
+        // one.
         let (freedom, points, runs) = (5.0, 60, 3000);
         let loss = Loss::Student(freedom);
         let mut draws = Draws::new(3, Purpose::Points, 0);

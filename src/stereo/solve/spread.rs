@@ -1,8 +1,9 @@
 //! How far black has spread on a grid of separate tags, whose corners it moves outwards from each tag.
 //!
-//! In: pairs at the minimum for the spread that their board's places hold. Out: the change that fits best, its standard deviation, and what it does to the
-//! rig. Method: one step of Gauss-Newton with the rig and the poses eliminated; tags that grow on the spot are next to nothing that these could take up,
-//! so that the step ends where it must. Where two black squares meet at a corner, as on every other board, nothing moves.
+//! In: pairs at the minimum for the spread that their board's places hold. Out: the change that fits best, its standard
+//! deviation, and what it does to the rig. Method: one step of Gauss-Newton with the rig and the poses eliminated; tags
+//! that grow on the spot are next to nothing that these could take up, so that the step ends where it must. Where two
+//! black squares meet at a corner, as on every other board, nothing moves.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -42,7 +43,8 @@ impl Spread {
         (curvature > 0.0).then(|| Spread { change_mm: -slope / curvature, sigma_mm: curvature.sqrt().recip(), by_mm })
     }
 
-    /// What not knowing it better adds to the covariance of the shared numbers, where the weights promise too little by a factor.
+    /// What not knowing it better adds to the covariance of the shared numbers, where the weights promise too little by
+    /// a factor.
     pub fn covariance(&self, inflation: f64) -> DMatrix<f64> {
         &self.by_mm * self.by_mm.transpose() * (self.sigma_mm * self.sigma_mm * inflation)
     }

@@ -1,7 +1,8 @@
-//! What the normal equations at a minimum say about uncertainty: covariances, and whether the views determine the cameras.
+//! What the normal equations at a minimum say about uncertainty: covariances, and whether the views determine the
+//! cameras.
 //!
-//! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers, with unit variance of the whitened residuals. Goes wrong:
-//! numbers that the views do not determine; then there is no covariance.
+//! In: the blocks of all pairs at a minimum. Out: the covariance of the shared numbers, with unit variance of the
+//! whitened residuals. Goes wrong: numbers that the views do not determine; then there is no covariance.
 
 use nalgebra::{DMatrix, DMatrixViewMut};
 use rayon::prelude::*;
@@ -13,12 +14,13 @@ use crate::stereo::{Rig, Side};
 
 /// A focal length that is known no better than this share tells no lens from another, and no rig passes with it.
 pub const WORST_FOCAL_SIGMA: f64 = 0.1;
-/// One that is known no better than this was told by what focal lengths usually are (a factor of two, see `priors`), not by the pictures.
+/// One that is known no better than this was told by what focal lengths usually are (a factor of two, see `priors`),
+/// not by the pictures.
 pub const UNTOLD_FOCAL_SIGMA: f64 = 0.35;
 
-/// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a richer
-/// model is expected to gain at a simpler one's minimum (Rao's score), or other data at the minimum of these. `None` where the views do not determine
-/// the unknowns.
+/// By how much chi-square (twice the cost) would fall if the equations were straight from here to the minimum: what a
+/// richer model is expected to gain at a simpler one's minimum (Rao's score), or other data at the minimum of these.
+/// `None` where the views do not determine the unknowns.
 pub fn expected_decrease(equations: &Equations) -> Option<f64> {
     let (matrix, gradient) = normal_equations::eliminate(equations, 0.0)?;
     let of_pose = |block: &Block| Some(block.pose_gradient.dot(&(block.pose_inverse(0.0)? * block.pose_gradient)));
@@ -26,12 +28,14 @@ pub fn expected_decrease(equations: &Equations) -> Option<f64> {
     Some(of_poses + gradient.dot(&(invert(&matrix)? * &gradient)))
 }
 
-/// Covariance of the shared numbers at a minimum, from the equations there. `None` where the views do not determine them.
+/// Covariance of the shared numbers at a minimum, from the equations there. `None` where the views do not determine
+/// them.
 pub fn covariance(equations: &Equations) -> Option<DMatrix<f64>> {
     invert(&normal_equations::eliminate(equations, 0.0)?.0)
 }
 
-/// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to rounding.
+/// Inverse of a symmetric positive definite matrix with rows of different units; `None` where it is singular to
+/// rounding.
 pub fn invert(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     /// Columns of the inverse that are worked on at a time.
     const COLUMNS: usize = 16;

@@ -1,4 +1,5 @@
-//! Lenses from another calibration: three pairs are enough for the rig, and lenses that are not those of the pictures are found and named.
+//! Lenses from another calibration: three pairs are enough for the rig, and lenses that are not those of the pictures
+//! are found and named.
 
 use super::*;
 use crate::stereo::board_pose::pair_excess::pair_excess;
@@ -93,8 +94,8 @@ fn of_two_calibrations_each_gives_its_side() {
     assert_eq!(both.covariance()[(0, left)], 0.0);
 }
 
-/// Deviations of three pairs' focal lengths from the known ones in their standard deviations, mean square; and of the baseline from the truth in
-/// its own. With the scatter of the earlier pairs told, and without.
+/// Deviations of three pairs' focal lengths from the known ones in their standard deviations, mean square; and of the
+/// baseline from the truth in its own. With the scatter of the earlier pairs told, and without.
 fn by_hand(turn_deg: f64) -> [[f64; 2]; 2] {
     const WORLDS: u64 = 4;
     let mut squares = [[0.0; 2]; 2];

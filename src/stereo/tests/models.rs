@@ -104,7 +104,8 @@ fn the_borders_of_a_wide_picture_are_no_outliers() {
     let mut world = World::new(10, 5);
     world.rig = Rig { left: camera, right, right_from_left: between, covariance: None };
     for (i, pose) in world.poses.iter_mut().enumerate() {
-        // One pair in three reaches to a border on the left, where 200 px are missing of what a lens without distortion shows.
+        // One pair in three reaches to a border on the left, where 200 px are missing of what a lens without distortion
+        // shows.
         let aside = if i % 3 == 0 { -120.0 } else { 8.0 * i as f64 };
         let turn = Vector3::new(0.3 - 0.07 * i as f64, 0.1 * (i as f64 - 4.0), 0.05 * i as f64);
         *pose = transform(turn, Vector3::new(aside, 5.0 * i as f64 - 20.0, 170.0 + 6.0 * i as f64));
@@ -138,7 +139,8 @@ fn a_prism_needs_no_rational_terms() {
 
 #[test]
 fn what_a_simple_lens_lacks_is_no_scatter_of_the_pairs() {
-    // Rational terms and a prism of a pixel: either alone explains little of what is left, and what the simplest lens leaves scatters the pairs.
+    // Rational terms and a prism of a pixel: either alone explains little of what is left, and what the simplest lens
+    // leaves scatters the pairs.
     let world = World { sigma_px: 0.002, print_mm: 0.001, ..World::paper(16, 0) };
     let distortion = [0.25, 0.12, 2e-4, -3e-4, 0.02, 0.35, 0.18, 0.03, 1.5e-3, 0.0, -1e-3];
     let world = world.with_lens(Lens::ThinPrism12, |d| d[..11].copy_from_slice(&distortion));

@@ -1,11 +1,13 @@
-//! Boards whose corners have numbers of their own: each picture shows another part, some pairs are seen by one camera alone.
+//! Boards whose corners have numbers of their own: each picture shows another part, some pairs are seen by one camera
+//! alone.
 
 use super::*;
 use crate::imaging::{Board, Corner, PairCorners, Side, Skipped};
 use crate::stereo::Error;
 use crate::stereo::judge::verdict::Verdict;
 
-/// A rig whose pairs show a board with markers, each picture the corners that `shows` says: pair, right side, column, row.
+/// A rig whose pairs show a board with markers, each picture the corners that `shows` says: pair, right side, column,
+/// row.
 fn seen(world: &World, seed: u64, shows: impl Fn(usize, bool, usize, usize) -> bool) -> Corners {
     let mut corners = world.corners(seed);
     for (i, pair) in corners.pairs.iter_mut().enumerate() {

@@ -197,7 +197,8 @@ fn a_pair_that_alone_tells_the_cameras_leaves_the_verdict_open() {
     assert!(judged(&World::new(9, 1).corners(1), &BROWN4, 0.5).facts.accuracy.unchecked.is_empty());
 }
 
-/// Five boards that all lie nearly alike: where no four of them tell the focal lengths, what these usually are still holds all five.
+/// Five boards that all lie nearly alike: where no four of them tell the focal lengths, what these usually are still
+/// holds all five.
 #[test]
 fn few_boards_that_lie_alike_are_calibrated_and_nothing_is_promised() {
     let all = ["00", "01", "02", "03", "04"];

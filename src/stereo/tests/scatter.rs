@@ -7,7 +7,8 @@ use crate::simulate::draws::{Draws, Purpose};
 use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::judge::verdict::{LengthError, Verdict};
 
-/// Noise as fits in windows of whole squares have it: across each edge, half of a corner's noise is that of the edge's other end.
+/// Noise as fits in windows of whole squares have it: across each edge, half of a corner's noise is that of the edge's
+/// other end.
 fn with_noise_of_shared_edges(exact: &Corners, sigma_px: f64, seed: u64) -> Corners {
     let mut corners = exact.clone();
     let mut draws = Draws::new(seed, Purpose::Points, 1);
@@ -51,7 +52,8 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
         let corners = with_noise_of_shared_edges(&exact.corners(0), 0.05, run);
         let found = calibrate(&corners, &BROWN4).unwrap();
         let neighbours = found.neighbours;
-        // One half between the two ends of an edge, none along it; 11 x 8 corners have 1.78 neighbours each to the right or below.
+        // One half between the two ends of an edge, none along it; 11 x 8 corners have 1.78 neighbours each to the
+        // right or below.
         assert!((neighbours.across - 0.5).abs() < 0.08 && neighbours.along.abs() < 0.08, "{neighbours:?}");
         assert!((neighbours.inflation() - 1.9).abs() < 0.25, "{neighbours:?}");
         assert!(crate::stereo::judge::residual_correlation::check(&found).white());
@@ -61,8 +63,8 @@ fn corners_that_share_edges_are_worth_less_and_no_fault() {
             predicted += 1.0;
         }
     }
-    // Without the allowance this ratio is near 0.7. 12 runs of correlated numbers know it to some 12 %; `cargo bench --bench calibration -- coverage` has
-    // each number's.
+    // Without the allowance this ratio is near 0.7. 12 runs of correlated numbers know it to some 12 %; `cargo bench
+    // --bench calibration -- coverage` has each number's.
     let ratio = (predicted / squares).sqrt();
     assert!((0.82..1.25).contains(&ratio), "predicted / true sigma {ratio:.3}");
 }
@@ -80,8 +82,8 @@ fn held_out_lengths_are_as_wrong_as_the_corners_make_them() {
     let accuracy = held_out::hold_out(&found, None).unwrap();
     assert_eq!(accuracy.pairs.len(), 12);
     assert_eq!(accuracy.ranges.len(), 10 + 7);
-    // 0.05 px is 0.056 mm of depth at 550 mm; boards tilted by 35 degrees turn it into 0.045 mm of length; the worst of 30 000
-    // lies at four to six sigmas.
+    // 0.05 px is 0.056 mm of depth at 550 mm; boards tilted by 35 degrees turn it into 0.045 mm of length; the worst of
+    // 30 000 lies at four to six sigmas.
     let extremes = accuracy.extremes;
     assert!((0.1..0.4).contains(&extremes.max_abs_error_mm), "{}", extremes.max_abs_error_mm);
     assert_eq!(extremes.verdict(1.0), Verdict::Pass);

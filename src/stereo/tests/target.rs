@@ -63,8 +63,9 @@ fn the_targets_scatter_is_the_predicted_one() {
         }
     }
     for sum in sums.iter() {
-        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all. Where nothing is known of the
-        // corners' usual scatter the poses' own is counted, along the line of sight generously.
+        // 60 poses: chi-square over its freedom is 1 +- 0.18; the target's shape is found as well and shared by all.
+        // Where nothing is known of the corners' usual scatter the poses' own is counted, along the line of sight
+        // generously.
         assert!((0.35..1.7).contains(&(sum / 60.0)), "{sums}");
     }
     assert_eq!(measured.judgement, Judgement::Agrees);
@@ -101,7 +102,8 @@ fn a_target_of_another_size_and_a_rig_that_turned_are_named() {
 
 #[test]
 fn a_rig_that_is_scaled_is_not_taken_for_a_larger_target() {
-    // The target's print is a little higher than wide, which a free size of its squares takes up better than a rig does.
+    // The target's print is a little higher than wide, which a free size of its squares takes up better than a rig
+    // does.
     let mut world = World { sigma_px: 0.004, ..World::new(14, 37) };
     world.board = Board { stretch: 1.0003, ..Board::checker("7x6".parse().unwrap(), 10.0) };
     let corners = world.corners(38);
@@ -116,7 +118,8 @@ fn a_rig_that_is_scaled_is_not_taken_for_a_larger_target() {
     }
 }
 
-/// Cameras side by side, boards from near to far: a right camera that turned makes all boards seem larger, the far ones more so.
+/// Cameras side by side, boards from near to far: a right camera that turned makes all boards seem larger, the far ones
+/// more so.
 #[test]
 fn a_camera_that_turned_is_not_told_as_a_target_of_another_size() {
     let mut world = World::facing(12, |i| Vector3::new(0.3 * (2.0 * i).sin(), 0.3 * (1.3 * i).cos(), 0.1 * i.sin()));
@@ -136,7 +139,8 @@ fn a_camera_that_turned_is_not_told_as_a_target_of_another_size() {
     assert!(sizes(&world, larger));
 }
 
-/// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one that does much more is named.
+/// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one
+/// that does much more is named.
 #[test]
 #[ignore = "slow"]
 fn the_pairs_of_a_calibration_are_measured_by_it() {
@@ -161,7 +165,8 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
     }
 }
 
-/// A lens with a free tilt and no distortion leaves open where its axis points: what turns all points about the camera together is no error.
+/// A lens with a free tilt and no distortion leaves open where its axis points: what turns all points about the camera
+/// together is no error.
 #[test]
 #[ignore = "slow"]
 fn points_are_not_off_by_what_turns_them_all_together() {
@@ -216,7 +221,8 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
     assert!(kept > 0);
 }
 
-/// A lens that warms up during the run: what its poses have in common looks like another change as well, and is named as what it is.
+/// A lens that warms up during the run: what its poses have in common looks like another change as well, and is named
+/// as what it is.
 #[test]
 #[ignore = "slow"]
 fn a_focus_that_creeps_is_not_named_as_something_that_all_poses_have() {

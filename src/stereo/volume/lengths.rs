@@ -1,9 +1,9 @@
 //! How uncertain a length is wherever it lies in the volume, and in the directions that boards took there.
 //!
-//! In: a calibrated rig with its covariance, and the volume that is asked for. Out: lengths through a lattice of places, with their standard
-//! deviations from the corners' scatter at both ends and from the calibration they share, and by how much another rig would measure
-//! them otherwise. Boards that were all parallel say nothing of lengths along the line of sight; these stand beside the others and decide
-//! only where they are asked for.
+//! In: a calibrated rig with its covariance, and the volume that is asked for. Out: lengths through a lattice of
+//! places, with their standard deviations from the corners' scatter at both ends and from the calibration they share,
+//! and by how much another rig would measure them otherwise. Boards that were all parallel say nothing of lengths along
+//! the line of sight; these stand beside the others and decide only where they are asked for.
 
 use nalgebra::{DVector, Point3, Vector3};
 use rayon::prelude::*;
@@ -106,14 +106,14 @@ pub struct VolumeLengths {
     pub lengths: Vec<VolumeLength>,
     /// The same along the line of sight, where no board lay.
     pub along_sight: Vec<VolumeLength>,
-    /// Largest standard deviation of one of them by the calibration alone, mm; of a volume that is less deep, that of the part that it holds, as it
-    /// would be over the whole. `None` of a volume without a depth.
+    /// Largest standard deviation of one of them by the calibration alone, mm; of a volume that is less deep, that of
+    /// the part that it holds, as it would be over the whole. `None` of a volume without a depth.
     pub along_sight_mm: Option<f64>,
 }
 
 impl VolumeLengths {
-    /// Lengths of `length_mm` through the volume. `share` of the corners' variance is what the pictures disagree by; the rest both
-    /// see alike, and it moves no point. Empty where the rig has no covariance.
+    /// Lengths of `length_mm` through the volume. `share` of the corners' variance is what the pictures disagree by;
+    /// the rest both see alike, and it moves no point. Empty where the rig has no covariance.
     pub fn new(calibration: &Calibration, extent: Extent, length_mm: f64, share: f64) -> VolumeLengths {
         let volume = Volume::of(calibration, extent);
         let rig = calibration.rig();
@@ -132,7 +132,8 @@ impl VolumeLengths {
         }
     }
 
-    /// The same through a volume that a file describes, in the directions of boards with its tilts; corners scatter by one px.
+    /// The same through a volume that a file describes, in the directions of boards with its tilts; corners scatter by
+    /// one px.
     pub fn of_volume(rig: &Rig, volume: &Volume, length_mm: f64) -> VolumeLengths {
         let Some(covariance) = rig.covariance.as_ref().map(RigCovariance::new) else {
             return VolumeLengths { volume: volume.clone(), length_mm, ..VolumeLengths::default() };
@@ -184,8 +185,8 @@ impl VolumeLengths {
     }
 }
 
-/// The rows' and the columns' directions of the boards that differ most: from the first on, always the one that lies least as those that
-/// are taken.
+/// The rows' and the columns' directions of the boards that differ most: from the first on, always the one that lies
+/// least as those that are taken.
 fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
     let poses = &calibration.values.poses;
     let apart = |a: usize, b: usize| poses[a].rotation.angle_to(&poses[b].rotation);
@@ -198,7 +199,8 @@ fn directions_of_boards(calibration: &Calibration) -> Vec<Vector3<f64>> {
     taken.iter().flat_map(|&i| [Vector3::x(), Vector3::y()].map(|axis| poses[i].rotation * axis)).collect()
 }
 
-/// The rows' and the columns' directions of boards with the least and the most of these tilts, deg: about x, then about y.
+/// The rows' and the columns' directions of boards with the least and the most of these tilts, deg: about x, then about
+/// y.
 fn directions_of_tilts([x_least, x_most, y_least, y_most]: [f64; 4]) -> Vec<Vector3<f64>> {
     let tilts = [(x_least, y_least), (x_least, y_most), (x_most, y_least), (x_most, y_most)];
     let directions = |(x, y): (f64, f64)| {

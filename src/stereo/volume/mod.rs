@@ -1,7 +1,8 @@
 //! The volume that a verdict is for: where the boards were.
 //!
-//! In: a calibration. Out: the part of both pictures that corners reached, a range of depth and of tilts, and lengths through it as the boards lay
-//! there. Beyond it the lens is extrapolated and nothing was checked: a rig says nothing of places and directions that no board showed it.
+//! In: a calibration. Out: the part of both pictures that corners reached, a range of depth and of tilts, and lengths
+//! through it as the boards lay there. Beyond it the lens is extrapolated and nothing was checked: a rig says nothing
+//! of places and directions that no board showed it.
 
 pub mod lengths;
 pub mod outline;

@@ -1,4 +1,5 @@
-//! The part of a picture that corners reached: the convex hull of all of them. Beyond it the lens model is extrapolated.
+//! The part of a picture that corners reached: the convex hull of all of them. Beyond it the lens model is
+//! extrapolated.
 
 use nalgebra::Point2;
 use serde::{Deserialize, Serialize};

@@ -1,5 +1,5 @@
-//! Whether a calibration still holds: how often a rig that stands is said to have changed, and changes of each cause at shares of the size that is
-//! said to be seen.
+//! Whether a calibration still holds: how often a rig that stands is said to have changed, and changes of each cause at
+//! shares of the size that is said to be seen.
 
 use rayon::prelude::*;
 use stereocal::geometry::transform;
@@ -23,8 +23,8 @@ const PAIRS: usize = 12;
 /// Of the size that is said to be seen in nineteen of twenty checks.
 const SHARES: [f64; 3] = [0.5, 1.0, 2.0];
 
-/// Cameras, and by how much the right one turns at random from pair to pair, deg: a board in a hand before cameras that nobody triggers
-/// looks like that.
+/// Cameras, and by how much the right one turns at random from pair to pair, deg: a board in a hand before cameras that
+/// nobody triggers looks like that.
 const SCENES: [(&str, Noise, f64); 2] = [
     ("1.6 Mpx, triggered", Noise { size_px: 1280, sigma_px: 0.01, print_um: Some(0.0) }, 0.0),
     ("1.6 Mpx, by hand", Noise { size_px: 1280, sigma_px: 0.05, print_um: Some(0.0) }, 0.01),

@@ -1,5 +1,5 @@
-//! Whether the 95 % intervals of the rig's numbers hold, and how well lengths on fresh boards are measured: many rigs calibrated from the
-//! simulator's true corners with Gaussian noise, also where the truth has what the model lacks.
+//! Whether the 95 % intervals of the rig's numbers hold, and how well lengths on fresh boards are measured: many rigs
+//! calibrated from the simulator's true corners with Gaussian noise, also where the truth has what the model lacks.
 
 use nalgebra::{Matrix2, Vector2};
 use rayon::prelude::*;
@@ -122,7 +122,8 @@ fn parameters(truth: &Rig, found: &Rig) -> Tally {
     tally
 }
 
-/// Lengths along rows and columns of fresh boards, seen with the same noise; or, where they are exact, the rig's share of the errors alone.
+/// Lengths along rows and columns of fresh boards, seen with the same noise; or, where they are exact, the rig's share
+/// of the errors alone.
 pub fn lengths(found: &Calibration, seed: u64, noise: Noise, exact: bool) -> Tally {
     const EXACT_PX: f64 = 1e-6;
     let mut tally = Tally::default();

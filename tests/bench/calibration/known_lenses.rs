@@ -1,5 +1,5 @@
-//! Lenses that are known: lengths against what any method could reach with the same corners and the same knowledge of the lenses, and lenses
-//! that are not those of the pictures.
+//! Lenses that are known: lengths against what any method could reach with the same corners and the same knowledge of
+//! the lenses, and lenses that are not those of the pictures.
 
 use rayon::prelude::*;
 use stereocal::imaging::Side;
@@ -19,8 +19,8 @@ use crate::coverage::{Noise, Tally, lengths, noisy, world};
 /// Rigs a line.
 const RIGS: u64 = 30;
 
-/// Pictures and their corners: 26 Mpx as rendered pictures give them, and 1.6 Mpx. The print is exact: what it does to lengths is no matter of the
-/// lenses, and would hide it.
+/// Pictures and their corners: 26 Mpx as rendered pictures give them, and 1.6 Mpx. The print is exact: what it does to
+/// lengths is no matter of the lenses, and would hide it.
 const CAMERAS: [Noise; 2] = [
     Noise { size_px: 5120, sigma_px: 0.002, print_um: Some(0.0) },
     Noise { size_px: 1280, sigma_px: 0.01, print_um: Some(0.0) },
@@ -82,7 +82,8 @@ fn known(seed: u64, pairs: usize, noise: Noise) -> Option<KnownLenses> {
     Some(known)
 }
 
-/// The same calibration with the least covariance that corners of this noise and lenses known so well allow (Cramer and Rao).
+/// The same calibration with the least covariance that corners of this noise and lenses known so well allow (Cramer and
+/// Rao).
 fn at_bound(found: &Calibration, known: &KnownLenses, noise: Noise) -> Option<Calibration> {
     let problem = found.problem();
     let problem = Problem { priors: problem.priors.knowing(known), ..problem };

@@ -1,8 +1,8 @@
-//! Benchmark `calibration`: what the bundle costs beside OpenCV's, whether the intervals of its numbers hold, what known lenses give, and what
-//! shows that a rig changed.
+//! Benchmark `calibration`: what the bundle costs beside OpenCV's, whether the intervals of its numbers hold, what
+//! known lenses give, and what shows that a rig changed.
 //!
-//! `cargo bench --bench calibration -- speed|coverage|known-lenses [PX]|against [RIGS] [SCENE]`; without a word all, a part of a scene's name is
-//! that scene.
+//! `cargo bench --bench calibration -- speed|coverage|known-lenses [PX]|against [RIGS] [SCENE]`; without a word all, a
+//! part of a scene's name is that scene.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,

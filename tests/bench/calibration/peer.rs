@@ -5,7 +5,8 @@ use opencv::core::{Mat, Point2f, Point3f, Size, TermCriteria, Vector};
 use opencv::prelude::MatTraitConstManual;
 use stereocal::imaging::{Corner, Corners};
 
-/// OpenCV's `calibrateCamera` and `stereoCalibrate` on complete boards, four distortion terms: RMS, px, and baseline, mm.
+/// OpenCV's `calibrateCamera` and `stereoCalibrate` on complete boards, four distortion terms: RMS, px, and baseline,
+/// mm.
 pub fn stereo_calibrate(corners: &Corners) -> opencv::Result<(f64, f64)> {
     let (mut objects, mut images) =
         (Vector::<Vector<Point3f>>::new(), [(); 2].map(|()| Vector::<Vector<Point2f>>::new()));

@@ -1,4 +1,5 @@
-//! 40 pairs of 361 corners: the bundle beside OpenCV's `stereoCalibrate` on the same corners, the simulator's true ones with Gaussian noise.
+//! 40 pairs of 361 corners: the bundle beside OpenCV's `stereoCalibrate` on the same corners, the simulator's true ones
+//! with Gaussian noise.
 
 use std::time::Instant;
 

@@ -91,7 +91,8 @@ fn row(size: u32, sectors_too: bool) {
     }
 }
 
-/// The crate `chess-corners` with its best refiner: it finds single corners, of which those nearest to the truth are judged.
+/// The crate `chess-corners` with its best refiner: it finds single corners, of which those nearest to the truth are
+/// judged.
 fn peer(grey: &Grey8, truth: &[Point2<f64>]) {
     use chess_corners::{Detector, DetectorConfig, ImageRefiner};
     /// A corner farther from the truth is another one, px.

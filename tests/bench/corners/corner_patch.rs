@@ -13,7 +13,8 @@ pub enum Spread {
     Disc(f64),
 }
 
-/// The patch's light at `side` x `side` pixels round (0, 0), in [-1, 1], for a corner at `corner`, with edges at `angles`.
+/// The patch's light at `side` x `side` pixels round (0, 0), in [-1, 1], for a corner at `corner`, with edges at
+/// `angles`.
 pub fn draw(side: i32, corner: (f64, f64), angles: [f64; 2], spread: Spread) -> Vec<f64> {
     let (sigma, disc) = match spread {
         Spread::Gaussian(sigma) => (sigma, 0.0),

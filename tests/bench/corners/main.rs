@@ -1,8 +1,9 @@
 //! Benchmark of the corner measurement: `cargo bench --bench corners` (add `--profile dev` to reuse the test build).
 //!
 //! Single corners, drawn by supersampling, against the Cramer-Rao bound of the same window; whole boards, drawn by the
-//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector and the crate `chess-corners` beside the fit on the same pictures; boards at
-//! all tilts and turns; boards with markers in part. `-- single`, `-- boards`, `-- poses 300`, `-- coded FIRST COUNT [FOLDER]` or `-- tags FIRST COUNT [FOLDER]` makes one table alone.
+//! simulator's renderer, with OpenCV's `cornerSubPix` and sector detector and the crate `chess-corners` beside the fit
+//! on the same pictures; boards at all tilts and turns; boards with markers in part. `-- single`, `-- boards`, `--
+//! poses 300`, `-- coded FIRST COUNT [FOLDER]` or `-- tags FIRST COUNT [FOLDER]` makes one table alone.
 
 #![allow(
     clippy::print_stdout,

@@ -93,7 +93,8 @@ fn measure(angle: f64, spread: Spread, noise: f64) -> Spot {
     let mut uniform = move || (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
     let mut spot = Spot { fit: Vec::new(), chi2: Vec::new(), sub_pix: Vec::new(), bound: 0.0, lost: 0 };
     let mut information = 0.0;
-    // The pictures stand side by side as the corners of one board, so that they share the light as a board's corners do.
+    // The pictures stand side by side as the corners of one board, so that they share the light as a board's corners
+    // do.
     let (mut board, mut truths) = (Vec::new(), Vec::new());
     for _ in 0..PLACES {
         let corner = (uniform() - 0.5, uniform() - 0.5);

@@ -1,10 +1,10 @@
-//! Planted faults against the verdict of `camera-check` and the points of `measure`: `cargo bench --bench faults [-- NAME ...] [--seed N] [--clean N] [--large] [--px N]
-//! [--program FILE] [--keep DIR]`.
+//! Planted faults against the verdict of `camera-check` and the points of `measure`: `cargo bench --bench faults [--
+//! NAME ...] [--seed N] [--clean N] [--large] [--px N] [--program FILE] [--keep DIR]`.
 //!
-//! Every case is a rendered folder, the command run on it as a user runs it, and the truth. Names choose cases that contain one of
-//! them; `--clean N` runs N controls of other seeds as well; `--large` runs those cases whose answer may depend on the size of the
-//! pictures at 5120 px; `--program` judges another build of the command; `--keep` keeps the pictures for
-//! the next run.
+//! Every case is a rendered folder, the command run on it as a user runs it, and the truth. Names choose cases that
+//! contain one of them; `--clean N` runs N controls of other seeds as well; `--large` runs those cases whose answer may
+//! depend on the size of the pictures at 5120 px; `--program` judges another build of the command; `--keep` keeps the
+//! pictures for the next run.
 #![allow(missing_docs, reason = "a benchmark is read as a whole")]
 #![allow(clippy::expect_used, clippy::panic, reason = "a benchmark ends where its folders cannot be made")]
 #![expect(clippy::print_stdout, reason = "a benchmark says what it measured")]

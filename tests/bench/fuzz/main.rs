@@ -1,5 +1,5 @@
-//! `cargo bench --bench fuzz -- [RUNS [SEED [TARGET...]]]`: every reader, or those named, with so many mutated files each.
-//! Ends with status 1 where one failed, and says which file made it fail.
+//! `cargo bench --bench fuzz -- [RUNS [SEED [TARGET...]]]`: every reader, or those named, with so many mutated files
+//! each. Ends with status 1 where one failed, and says which file made it fail.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,

@@ -1,6 +1,6 @@
-//! Fuzzing of every reader on stable Rust: files made by the program's own writers, mutated by a seeded stream, read in this
-//! process. A run that panics, takes longer than [`MOST_TIME`] or lets the process grow beyond [`MOST_BYTES`] is a failure; its
-//! input is kept.
+//! Fuzzing of every reader on stable Rust: files made by the program's own writers, mutated by a seeded stream, read in
+//! this process. A run that panics, takes longer than [`MOST_TIME`] or lets the process grow beyond [`MOST_BYTES`] is a
+//! failure; its input is kept.
 
 pub mod corpus;
 pub mod mutate;

@@ -1,8 +1,10 @@
-//! How surely STAPSO ends at the least cost: the paper's constants and those shipped, with the paper's stop and without.
+//! How surely STAPSO ends at the least cost: the paper's constants and those shipped, with the paper's stop and
+//! without.
 //!
-//! The least cost is that of 50 starts of the trust region drawn in the box. "Below" counts the seeds whose best cost is less than
-//! that of each of PSO, CPSO, APSO and ARPSO at as many evaluations as STAPSO spent (at the most their 500 iterations'); "level"
-//! those where one or more of them has reached the same cost by then, to the rounding of different sums, and none a lesser one.
+//! The least cost is that of 50 starts of the trust region drawn in the box. "Below" counts the seeds whose best cost
+//! is less than that of each of PSO, CPSO, APSO and ARPSO at as many evaluations as STAPSO spent (at the most their 500
+//! iterations'); "level" those where one or more of them has reached the same cost by then, to the rounding of
+//! different sums, and none a lesser one.
 
 use camino::Utf8Path;
 use rand::{RngExt, SeedableRng};

@@ -1,7 +1,7 @@
 //! The paper's experiment rebuilt by the commands themselves: `simulate --points-only`, then `identify`.
 //!
-//! Table 2's errors as the truth, one orientation, 262 poses and 50 to verify, 0.02 mm noise a coordinate; then the same with
-//! sag of joints 2 and 3 and periodic errors of the drives, which the identified model does not have.
+//! Table 2's errors as the truth, one orientation, 262 poses and 50 to verify, 0.02 mm noise a coordinate; then the
+//! same with sag of joints 2 and 3 and periodic errors of the drives, which the identified model does not have.
 
 use std::path::Path;
 use std::process::Command;

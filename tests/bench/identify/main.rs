@@ -1,8 +1,9 @@
 //! Benchmark of the identification.
 //!
 //! `cargo bench --bench identify` times the solvers (`-- speed [measurements.csv robot.toml]` on files of your own);
-//! `-- experiment [SEEDS]` rebuilds the paper's experiment with the commands themselves, with and without effects that the
-//! model lacks; `-- constants [SEEDS]` asks how surely STAPSO ends at the least cost, with the paper's constants and with ours.
+//! `-- experiment [SEEDS]` rebuilds the paper's experiment with the commands themselves, with and without effects that
+//! the model lacks; `-- constants [SEEDS]` asks how surely STAPSO ends at the least cost, with the paper's constants
+//! and with ours.
 #![allow(
     clippy::print_stdout,
     clippy::unwrap_used,

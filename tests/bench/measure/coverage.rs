@@ -1,4 +1,5 @@
-//! Whether the intervals hold what they promise: points, orientations and distances to the centre against the truth, over many rigs.
+//! Whether the intervals hold what they promise: points, orientations and distances to the centre against the truth,
+//! over many rigs.
 
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;

@@ -1,7 +1,8 @@
 //! Benchmark `measure`: is what `measure` says true, does it notice what is wrong, and what does it cost.
 //!
-//! `cargo bench --bench measure -- coverage|pictures|robots|faults|changes|speed`; without a word all of them. `changes` is a part of `faults`. `coverage`, `robots` and `faults` work on the
-//! simulator's true corners with Gaussian noise, so that hundreds of poses cost seconds; `pictures` (of one size in px, where a number follows) and
+//! `cargo bench --bench measure -- coverage|pictures|robots|faults|changes|speed`; without a word all of them.
+//! `changes` is a part of `faults`. `coverage`, `robots` and `faults` work on the simulator's true corners with
+//! Gaussian noise, so that hundreds of poses cost seconds; `pictures` (of one size in px, where a number follows) and
 //! `speed` run the program on rendered pictures.
 #![allow(
     clippy::print_stdout,

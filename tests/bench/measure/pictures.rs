@@ -1,4 +1,5 @@
-//! The same question as `coverage`, from rendered pictures through the program: what windows, blur and bent edges do is in it.
+//! The same question as `coverage`, from rendered pictures through the program: what windows, blur and bent edges do is
+//! in it.
 
 use std::collections::BTreeMap;
 use std::path::Path;

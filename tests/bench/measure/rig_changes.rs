@@ -1,5 +1,5 @@
-//! A rig that changes along a short run, pictures that are mirrored or not simultaneous: what is said, whether that is the reason, and how far
-//! the points that are given as good are off against what they say of themselves.
+//! A rig that changes along a short run, pictures that are mirrored or not simultaneous: what is said, whether that is
+//! the reason, and how far the points that are given as good are off against what they say of themselves.
 
 use nalgebra::Vector3;
 use stereocal::simulate::draws::{Draws, Purpose};
@@ -135,7 +135,8 @@ const LINES: [Line; 7] = [
     },
 ];
 
-/// `right_from_left` is turned about y and shifted at random from picture to picture, as by a board that moves between the two.
+/// `right_from_left` is turned about y and shifted at random from picture to picture, as by a board that moves between
+/// the two.
 fn shaken(world: &World, deg: f64, mm: f64, stream: u64) -> impl Fn(usize, &mut World) {
     let seed = world.settings.seed;
     move |i, world| {

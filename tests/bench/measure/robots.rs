@@ -1,5 +1,5 @@
-//! Whether robots that are identified from measured poses are as uncertain as `identify` says: what all poses share comes along in
-//! `measure.json`, and the robot repeats exactly, so that nothing but the corners' noise is left.
+//! Whether robots that are identified from measured poses are as uncertain as `identify` says: what all poses share
+//! comes along in `measure.json`, and the robot repeats exactly, so that nothing but the corners' noise is left.
 
 use camino::Utf8Path;
 use nalgebra::Point3;
@@ -32,8 +32,8 @@ const WIDTH: f64 = 1.96;
 struct Outcome {
     /// Mean error of points at the poses that the robot has, mm: promised, and against the truth.
     promise_mm: [f64; 2],
-    /// Base parameters of the noisy points against those of the same points without noise, in standard deviations; none where other terms
-    /// were taken.
+    /// Base parameters of the noisy points against those of the same points without noise, in standard deviations; none
+    /// where other terms were taken.
     parameters: Option<Vec<f64>>,
 }
 
@@ -56,7 +56,8 @@ pub fn run() {
         let mut off: Vec<f64> = outcomes.into_iter().filter_map(|o| o.parameters).flatten().map(f64::abs).collect();
         off.sort_by(f64::total_cmp);
         let inside = 100.0 * off.iter().filter(|z| **z <= WIDTH).count() as f64 / off.len() as f64;
-        // Not their mean square: what the poses hardly see may be shared out otherwise, by many of its sigmas, in a robot that is the same.
+        // Not their mean square: what the poses hardly see may be shared out otherwise, by many of its sigmas, in a
+        // robot that is the same.
         let quantile = off[(0.95 * off.len() as f64) as usize] / WIDTH;
         println!(
             "{target_um:5.0} um | {:11.3} {:10.3} {:17.2} | {quantile:23.2} {inside:17.1} % ({robots} robots of MDH)",

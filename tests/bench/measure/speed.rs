@@ -70,7 +70,8 @@ pub fn run(folder: &Path, args: &[&str]) -> (f64, f64) {
     (*wall_s.get().expect("an end"), peak_kb / 1024.0)
 }
 
-/// Reads every picture and hands its bytes to a decoder, with the program's threads, and does nothing with what it gives.
+/// Reads every picture and hands its bytes to a decoder, with the program's threads, and does nothing with what it
+/// gives.
 fn decode_s(folder: &Path, decode: impl Fn(&[u8], &camino::Utf8Path) + Sync) -> f64 {
     let paths: Vec<camino::Utf8PathBuf> = ["left", "right"]
         .iter()

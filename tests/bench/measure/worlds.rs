@@ -11,7 +11,8 @@ use stereocal::stereo::board_pose::{Knowledge, Seen};
 use stereocal::stereo::calibrate::calibrate;
 use stereocal::stereo::select::options::Options;
 
-/// Standard deviation of a corner's coordinate at 1280 px, as rendered pictures give it; at 5120 px the same corner is as sharp.
+/// Standard deviation of a corner's coordinate at 1280 px, as rendered pictures give it; at 5120 px the same corner is
+/// as sharp.
 pub const SIGMA_PX: f64 = 0.002;
 
 /// A world of a size, with a target whose crossings are off by so much.

@@ -1,8 +1,9 @@
-//! Benchmark of the planner: is the accuracy that it promises realised, and what do its poses save against the paper's layout?
+//! Benchmark of the planner: is the accuracy that it promises realised, and what do its poses save against the paper's
+//! layout?
 //!
-//! `cargo bench --bench plan [-- ROBOTS]` draws so many robots of each of three arms, measures them at 60 planned poses, at 266 of the
-//! paper's layout with varied orientation and at 266 with one orientation, identifies them, and judges them at fresh poses. Then it
-//! renders a plan of each arm and counts the poses that `measure` finds.
+//! `cargo bench --bench plan [-- ROBOTS]` draws so many robots of each of three arms, measures them at 60 planned
+//! poses, at 266 of the paper's layout with varied orientation and at 266 with one orientation, identifies them, and
+//! judges them at fresh poses. Then it renders a plan of each arm and counts the poses that `measure` finds.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 

@@ -1,4 +1,5 @@
-//! Planned poses as pictures: does `measure` find the target at every one of them, also where the cameras stand otherwise than assumed?
+//! Planned poses as pictures: does `measure` find the target at every one of them, also where the cameras stand
+//! otherwise than assumed?
 
 use std::process::Command;
 
@@ -26,8 +27,8 @@ const OFF_DEG: f64 = 10.0;
 /// Safe poses before the others.
 const FIRST: usize = 6;
 
-/// A line an arm: poses rendered and measured where the cameras stand as planned; then, where they do not, the first poses and those
-/// planned after them.
+/// A line an arm: poses rendered and measured where the cameras stand as planned; then, where they do not, the first
+/// poses and those planned after them.
 pub fn table(settings: &Settings) {
     println!("\nplanned poses of a machine that is off, rendered at {SIZE_PX} px and measured");
     for (name, nominal) in arms::arms() {

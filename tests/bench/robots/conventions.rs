@@ -1,4 +1,5 @@
-//! Wrong conventions planted in the tables of real robots, whose joints move less than a simulated plan's: is each named, and what does it cost?
+//! Wrong conventions planted in the tables of real robots, whose joints move less than a simulated plan's: is each
+//! named, and what does it cost?
 
 use std::path::{Path, PathBuf};
 
@@ -21,8 +22,9 @@ const SETS: [&str; 4] = ["irb120-tracker-a", "ur5-tracker", "motoman-right", "ro
 /// Changes rows or the nominal robot.
 type Plant = fn(&mut Vec<Measurement>, &mut Robot);
 
-/// Faults and words of the findings that name each. Half a turn of a wrist's first joint is a flipped sign of its second where the target
-/// stands near the last axis, and half a turn of the shoulder the first joint counted the other way round.
+/// Faults and words of the findings that name each. Half a turn of a wrist's first joint is a flipped sign of its
+/// second where the target stands near the last axis, and half a turn of the shoulder the first joint counted the other
+/// way round.
 const FAULTS: [(&str, Plant, &[&str]); 17] = [
     ("clean", |_, _| {}, &[]),
     ("radians", |rows, _| joints(rows, |_, q| q.iter_mut().for_each(|q| *q = q.to_radians())), &["radians"]),
@@ -47,7 +49,8 @@ const FAULTS: [(&str, Plant, &[&str]); 17] = [
     ("standard DH", |_, robot| *robot = as_standard(robot), &["standard DH"]),
 ];
 
-/// One line a fault, two columns a set: whether it was named, and the error on verify rows against that of the clean table.
+/// One line a fault, two columns a set: whether it was named, and the error on verify rows against that of the clean
+/// table.
 pub fn table() {
     let root = std::env::var_os("STEREOCAL_SHARED")
         .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared"), PathBuf::from);

@@ -1,4 +1,5 @@
-//! Planted faults: is each named as what it is, and is nothing named on clean rows? Gross errors: what do they cost, and are they named?
+//! Planted faults: is each named as what it is, and is nothing named on clean rows? Gross errors: what do they cost,
+//! and are they named?
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use rayon::prelude::*;

@@ -1,6 +1,8 @@
 //! Benchmark of the identification on robots: the real sets where they are, and simulated arms whose truth is known.
 //!
-//! `cargo bench --bench robots` prints all; `-- real` (with wrong conventions planted in the real tables), `-- simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]`, `-- targets [RUNS]`, `-- people [RUNS]` and `-- speed` one of them.
+//! `cargo bench --bench robots` prints all; `-- real` (with wrong conventions planted in the real tables), `--
+//! simulated [RUNS]`, `-- faults [RUNS [FAULT]]`, `-- touches [RUNS]`, `-- targets [RUNS]`, `-- people [RUNS]` and `--
+//! speed` one of them.
 #![allow(clippy::print_stdout, reason = "a benchmark says what it measured")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a benchmark that cannot run has nothing to say")]
 #![allow(clippy::disallowed_methods, reason = "a benchmark looks at the clock")]

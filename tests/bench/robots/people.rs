@@ -1,5 +1,6 @@
-//! Tables as people have them, simulated: one axis after the other, three readings a pose, a tool that nobody knows. Errors against the truth
-//! beside those of the least squares that knows the noise and the tolerance, which nothing can better on average.
+//! Tables as people have them, simulated: one axis after the other, three readings a pose, a tool that nobody knows.
+//! Errors against the truth beside those of the least squares that knows the noise and the tolerance, which nothing can
+//! better on average.
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;

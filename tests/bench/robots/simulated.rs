@@ -1,4 +1,5 @@
-//! Simulated arms: do intervals hold, is the promised accuracy the realised one, and is the result ever worse than nominal?
+//! Simulated arms: do intervals hold, is the promised accuracy the realised one, and is the result ever worse than
+//! nominal?
 
 use rayon::prelude::*;
 use stereocal::identify::Settings;
@@ -113,8 +114,8 @@ pub fn judged(
     Some((outcome, kept.clone()))
 }
 
-/// How many base parameters of the chosen fit have the truth in their interval, and how many there are; none where the truth has
-/// parameters that the model lacks.
+/// How many base parameters of the chosen fit have the truth in their interval, and how many there are; none where the
+/// truth has parameters that the model lacks.
 fn intervals(found: &Identification, nominal: &Robot, truth: &Robot) -> [usize; 2] {
     let Some((formulation, _)) = &found.candidates[found.chosen].found else { return [0, 0] };
     let (parameters, base) = (formulation.parameters(), &formulation.base);

@@ -1,4 +1,5 @@
-//! Several targets a pose beside one: errors against the truth, at the mark point and at a tool further out, and whether intervals hold.
+//! Several targets a pose beside one: errors against the truth, at the mark point and at a tool further out, and
+//! whether intervals hold.
 
 use nalgebra::{Point3, Vector3};
 use rand::SeedableRng;

@@ -1,5 +1,5 @@
-//! Simulated touches: a ball in sockets, some hundredths of a millimetre of play, three known distances. Beside the program a plain least squares of
-//! all MDH parameters, written for this and nothing else.
+//! Simulated touches: a ball in sockets, some hundredths of a millimetre of play, three known distances. Beside the
+//! program a plain least squares of all MDH parameters, written for this and nothing else.
 
 use nalgebra::{DMatrix, DVector, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -175,7 +175,8 @@ fn faults(runs: u64) {
     }
 }
 
-/// Consistency and distortion of nominal robot, program and least squares; whether an unseen scale is said without known distances.
+/// Consistency and distortion of nominal robot, program and least squares; whether an unseen scale is said without
+/// known distances.
 fn outcome(nominal: &Robot, beyond: Beyond, seed: u64) -> [f64; 7] {
     let World { nominal, rows, known, .. } = World::new(nominal, beyond, 0.0, seed);
     let mut set = Dataset::new(&rows).expect("rows");
@@ -240,7 +241,8 @@ fn touched(truth: &Robot, moved_mm: f64, random: &mut Pcg64Mcg) -> (Vec<Measurem
     (rows, sockets)
 }
 
-/// All MDH parameters by Gauss and Newton, derivatives by differences: touches about their mean, and the known distances.
+/// All MDH parameters by Gauss and Newton, derivatives by differences: touches about their mean, and the known
+/// distances.
 fn least_squares(set: &Dataset, nominal: &Robot) -> Robot {
     let parameters = nominal.mdh_parameters();
     let rows = set.fit_rows();

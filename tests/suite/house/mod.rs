@@ -32,7 +32,8 @@ fn code(path: &Path) -> Vec<(usize, String)> {
 
 fn without_tests(text: &str) -> Vec<(usize, String)> {
     let mut kept = Vec::new();
-    // Braces that are open in an item under `#[cfg(test)]`; such an item ends with the last of them, or with a semicolon before any.
+    // Braces that are open in an item under `#[cfg(test)]`; such an item ends with the last of them, or with a
+    // semicolon before any.
     let mut open: Option<i32> = None;
     for (i, line) in text.lines().enumerate() {
         let code = line.split("//").next().unwrap_or_default();

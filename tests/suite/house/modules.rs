@@ -1,8 +1,10 @@
-//! The source as a graph of modules: who uses whose items, resolved through imports and re-exports as the compiler does.
+//! The source as a graph of modules: who uses whose items, resolved through imports and re-exports as the compiler
+//! does.
 //!
-//! In: the root file of a crate. Out: its modules, and for each the modules that define what its paths name. A module of nothing
-//! but `mod` and `pub use` hands on what others define and is no module of its own. What is compiled for tests alone is left out.
-//! A method that is called on a value whose type is never written leaves no path and is not seen.
+//! In: the root file of a crate. Out: its modules, and for each the modules that define what its paths name. A module
+//! of nothing but `mod` and `pub use` hands on what others define and is no module of its own. What is compiled for
+//! tests alone is left out. A method that is called on a value whose type is never written leaves no path and is not
+//! seen.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -91,7 +93,8 @@ impl Crate {
         used
     }
 
-    /// What `path` names where it stands in module `from`; of a module and an item of the same name the item, if `item`.
+    /// What `path` names where it stands in module `from`; of a module and an item of the same name the item, if
+    /// `item`.
     fn resolve(
         &self,
         from: usize,

@@ -142,7 +142,8 @@ fn points_that_were_computed_are_said_to_be() {
     assert!(told.starts_with("check before") && told.contains("were computed, or have too few digits"), "{told}");
 }
 
-/// Rows of an arm with a tool of its own, its links as in `built`; each coordinate scattered by about `noise_mm`, lengths times `scale`.
+/// Rows of an arm with a tool of its own, its links as in `built`; each coordinate scattered by about `noise_mm`,
+/// lengths times `scale`.
 fn of_arm(built: &Robot, poses: usize, noise_mm: f64, scale: f64) -> Rows {
     let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
     let row = |i: usize| {
@@ -255,7 +256,8 @@ fn rows_of_a_pose_of_which_one_is_missing_are_told_with_a_form_that_takes_them()
     assert!(found.len() == 72 && found[0].target == "a" && found[10].target == "b", "{:?}", found[10]);
 }
 
-/// Points that vary along one axis alone leave both units open: each flag that is named settles both, and nothing is asked again.
+/// Points that vary along one axis alone leave both units open: each flag that is named settles both, and nothing is
+/// asked again.
 #[test]
 fn units_that_are_open_are_asked_once() {
     let folder = Folder(workplace());
@@ -273,7 +275,8 @@ fn units_that_are_open_are_asked_once() {
     }
 }
 
-/// Where two files lack something, the columns of both are those that a flag names, and lists of a program that no language says are no joints by that.
+/// Where two files lack something, the columns of both are those that a flag names, and lists of a program that no
+/// language says are no joints by that.
 #[test]
 fn what_is_lacking_is_said_of_all_files() {
     let folder = Folder(workplace());

@@ -1,5 +1,5 @@
-//! Forms in which tables are published: headings over names, lists in cells, names of other languages and of recorders, matrices without names,
-//! and two points side by side that no number tells apart.
+//! Forms in which tables are published: headings over names, lists in cells, names of other languages and of recorders,
+//! matrices without names, and two points side by side that no number tells apart.
 
 use super::*;
 
@@ -195,7 +195,8 @@ fn what_is_far_off_is_said_of_the_sum_that_is_determined() {
     }
 }
 
-/// A joint that slides has the unit of its own column, else that of the points; a column of lengths is no joint that turns.
+/// A joint that slides has the unit of its own column, else that of the points; a column of lengths is no joint that
+/// turns.
 #[test]
 fn a_joint_that_slides_is_read_in_its_own_unit() {
     let folder = Folder(workplace());

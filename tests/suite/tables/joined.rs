@@ -1,4 +1,5 @@
-//! Files that name their rows: joined by these names, rows without a partner said, contradictions said, copies counted once.
+//! Files that name their rows: joined by these names, rows without a partner said, contradictions said, copies counted
+//! once.
 
 use super::*;
 
@@ -113,7 +114,8 @@ fn several_readings_a_pose_are_joined_by_its_name() {
     refused(&source(&[&q, &p]), &robot, &["`4` has 2 rows, others have 1"]);
 }
 
-/// Each pose of these rows read so many times, some more often than others, a few micrometres apart; and the pose of each.
+/// Each pose of these rows read so many times, some more often than others, a few micrometres apart; and the pose of
+/// each.
 fn repeated(rows: &Rows, times: fn(usize) -> usize) -> (Rows, Vec<(usize, String)>) {
     let poses: Vec<usize> = (0..rows.len()).flat_map(|pose| vec![pose; times(pose)]).collect();
     let read = |(k, &pose): (usize, &usize)| {
@@ -158,7 +160,8 @@ fn readings_repeated_under_the_name_of_a_pose_are_of_one_pose() {
         found.sort_by_key(number);
         same(&found, &readings, "two files");
     }
-    // Other joints under one name, a point that is another one, and one of two readings that is far off: none is a reading of one point.
+    // Other joints under one name, a point that is another one, and one of two readings that is far off: none is a
+    // reading of one point.
     let (readings, names) = repeated(&rows, |_| 2);
     let mut turned = readings.clone();
     turned[7].0[2] += 0.5;

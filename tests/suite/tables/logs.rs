@@ -1,5 +1,5 @@
-//! What recorders and logs leave: joints whose names stand in cells and in the order of the alphabet, lines that name their lists, records of JSON,
-//! and figures below a table.
+//! What recorders and logs leave: joints whose names stand in cells and in the order of the alphabet, lines that name
+//! their lists, records of JSON, and figures below a table.
 
 use super::*;
 

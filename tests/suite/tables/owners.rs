@@ -1,5 +1,5 @@
-//! What owners of tables leave for the reader to find out: names of two words between blanks, numbers of reflectors and of places, transforms one below
-//! the other; and robots as tables of formulas and in the text of programs.
+//! What owners of tables leave for the reader to find out: names of two words between blanks, numbers of reflectors and
+//! of places, transforms one below the other; and robots as tables of formulas and in the text of programs.
 
 use super::*;
 
@@ -296,7 +296,8 @@ fn a_description_whose_declaration_does_not_stand_at_its_beginning_is_read() {
     assert!(bad.status.code() == Some(2) && stderr(&bad).contains("bad.urdf:11"), "{}", stderr(&bad));
 }
 
-/// The figures of a robot whose file has no tool are those of its absence: that is said, and nothing of one that has it.
+/// The figures of a robot whose file has no tool are those of its absence: that is said, and nothing of one that has
+/// it.
 #[test]
 fn verify_says_which_tool_a_robot_asks_for() {
     let folder = Folder(workplace());

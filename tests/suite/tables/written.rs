@@ -1,5 +1,5 @@
-//! What stands in cells beside numbers, tables below or beside others, files that are no tables: read as a person reads them, or said with what they
-//! are and where.
+//! What stands in cells beside numbers, tables below or beside others, files that are no tables: read as a person reads
+//! them, or said with what they are and where.
 
 use super::*;
 

@@ -20,7 +20,8 @@ pub(super) struct Beside {
     pub left_out: Vec<String>,
 }
 
-/// Limits in degrees: in radians where they say so, or none is beyond two turns. Those of joints that slide stay as they are.
+/// Limits in degrees: in radians where they say so, or none is beyond two turns. Those of joints that slide stay as
+/// they are.
 fn in_deg(limits: &mut [Option<Limits>], slides: &[bool], stated: Option<Unit>) {
     let mut turning: Vec<&mut Limits> = limits
         .iter_mut()

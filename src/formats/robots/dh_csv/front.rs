@@ -272,7 +272,8 @@ fn without_entities(text: &str) -> Cow<'_, str> {
     plain.into()
 }
 
-/// The table of a document alone, whose rows have bars between their cells, in lines where they stand; the text where it has none.
+/// The table of a document alone, whose rows have bars between their cells, in lines where they stand; the text where
+/// it has none.
 fn alone<'a>(path: &Utf8Path, text: &'a str) -> Result<Cow<'a, str>> {
     let lines: Vec<&str> = text.lines().collect();
     let is_rule = |line: &str| !line.trim().is_empty() && line.chars().all(|c| "-=+|: \t".contains(c));

@@ -1,7 +1,8 @@
 //! The rows of a table in LaTeX: cells with `&` between them, rows that `\\` ends, rules between these.
 //!
-//! In: a document. Out: its table, each row with its line, cells as formulas have them (`-90°`, `pi/2`). A table whose first row names
-//! alpha, or a twist, is the robot's. What goes wrong: two of these, and an environment without its end; refused with the line.
+//! In: a document. Out: its table, each row with its line, cells as formulas have them (`-90°`, `pi/2`). A table whose
+//! first row names alpha, or a twist, is the robot's. What goes wrong: two of these, and an environment without its
+//! end; refused with the line.
 
 use crate::formats::robots::dh_text::Wrong;
 use crate::tables::Fields;

@@ -1,6 +1,8 @@
-//! The column of a table that is theta, where toolboxes write the joints' zero offsets beside it: theta is the joint's variable there, or not written.
+//! The column of a table that is theta, where toolboxes write the joints' zero offsets beside it: theta is the joint's
+//! variable there, or not written.
 //!
-//! What goes wrong: more than the variable in theta, and the offset of a joint that slides, which is a length; refused with the line.
+//! What goes wrong: more than the variable in theta, and the offset of a joint that slides, which is a length; refused
+//! with the line.
 
 use super::names::{BY_FLAG, named, zero_offsets};
 use super::table::Table;

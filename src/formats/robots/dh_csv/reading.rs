@@ -1,5 +1,5 @@
-//! One way to read a table, and its robot: whether alpha and a of a row stand before the joint (modified, Craig) or behind it (classic, Denavit
-//! and Hartenberg), and what tells it.
+//! One way to read a table, and its robot: whether alpha and a of a row stand before the joint (modified, Craig) or
+//! behind it (classic, Denavit and Hartenberg), and what tells it.
 
 use std::fmt::Write as _;
 
@@ -21,7 +21,8 @@ const TWIST: &str = "a twist";
 /// How far an angle may be from a multiple of 90 deg that was rounded, deg.
 const DRAWN_DEG: f64 = 0.1;
 
-/// The same in this program's own tables, which may hold zeros that were identified, deg: more than a joint's zero is set off by.
+/// The same in this program's own tables, which may hold zeros that were identified, deg: more than a joint's zero is
+/// set off by.
 const BUILT_DEG: f64 = 5.0;
 
 /// A way to read a table.
@@ -121,9 +122,10 @@ impl Reading {
         }
     }
 
-    /// What the table's ends show. An arm stands on its base and ends in a flange: the twist between its last axes is in the last row of a modified
-    /// table, whose first row is none between axes, and that between its first axes in the first row of a classic one, whose last row is none. A length
-    /// tells nothing: a modified table may begin beside the first axis, and a classic one end at the tip of a gripper.
+    /// What the table's ends show. An arm stands on its base and ends in a flange: the twist between its last axes is
+    /// in the last row of a modified table, whose first row is none between axes, and that between its first axes in
+    /// the first row of a classic one, whose last row is none. A length tells nothing: a modified table may begin
+    /// beside the first axis, and a classic one end at the tip of a gripper.
     fn shown(&self) -> (Option<Convention>, String) {
         let end = |row: &Row| match (row[0] != 0.0, row[1] != 0.0) {
             (true, _) => TWIST,

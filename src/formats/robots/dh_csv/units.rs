@@ -1,7 +1,9 @@
-//! In which unit the angles and the lengths of a table are: what a flag or the names say, else what the numbers look like, else what words around it say.
+//! In which unit the angles and the lengths of a table are: what a flag or the names say, else what the numbers look
+//! like, else what words around it say.
 //!
-//! What the numbers leave open, and no word says, is asked. What goes wrong: names that say degrees or mm over radians or metres, and a quarter turn in radians
-//! beside angles in degrees, or in the place of a length; refused with the line.
+//! What the numbers leave open, and no word says, is asked. What goes wrong: names that say degrees or mm over radians
+//! or metres, and a quarter turn in radians beside angles in degrees, or in the place of a length; refused with the
+//! line.
 
 use super::names::NAMES;
 use super::table::Table;
@@ -116,7 +118,8 @@ fn stated_unit(table: &Table, numbers: &[Row], at: [usize; 2], unit: Unit) -> Re
     Ok(())
 }
 
-/// The unit of angles that no name states: numbers beyond two turns are degrees, and among others a quarter turn tells radians.
+/// The unit of angles that no name states: numbers beyond two turns are degrees, and among others a quarter turn tells
+/// radians.
 fn angle(table: &Table, numbers: &[Row], at: [usize; 2], largest: f64) -> Result<Units> {
     let all = || numbers.iter().enumerate().flat_map(|(i, r)| at.map(|k| (i, r[k])));
     if largest == 0.0 {

@@ -1,7 +1,8 @@
-//! Links that a program adds to its list without making them: those of another robot, `links.extend(puma.links)`, or of a loop.
+//! Links that a program adds to its list without making them: those of another robot, `links.extend(puma.links)`, or of
+//! a loop.
 //!
-//! In: code, and the links that its calls make. Out: a refusal with the line of what cannot be followed. What goes wrong: what the text
-//! does between is not run, so that a list which is cut short afterwards is not seen.
+//! In: code, and the links that its calls make. Out: a refusal with the line of what cannot be followed. What goes
+//! wrong: what the text does between is not run, so that a list which is cut short afterwards is not seen.
 
 use super::link::{Link, Wrong, makes};
 use super::lists::up_to;

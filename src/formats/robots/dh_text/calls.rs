@@ -1,4 +1,5 @@
-//! Calls of toolboxes that make links, and what words in them say: the convention, that a joint slides, that it counts the other way.
+//! Calls of toolboxes that make links, and what words in them say: the convention, that a joint slides, that it counts
+//! the other way.
 
 use super::link::{Link, Wrong};
 use super::lists::{extent, list};

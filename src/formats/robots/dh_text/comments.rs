@@ -51,7 +51,8 @@ pub(super) fn split(text: &str) -> (String, String) {
     (plain, comments)
 }
 
-/// The text without what Python runs of a file by itself alone, `if __name__ == "__main__":`, as empty lines: that shows how a robot is used.
+/// The text without what Python runs of a file by itself alone, `if __name__ == "__main__":`, as empty lines: that
+/// shows how a robot is used.
 pub(super) fn without_demonstration(code: &str) -> String {
     let mut shows = false;
     let mut plain = String::with_capacity(code.len());

@@ -1,7 +1,9 @@
-//! The base and the tool that a program tells the toolbox: `DHRobot(links, tool=transl(0, 0, 0.1), base=SE3.Rx(pi/2))`, `robot.tool = ...`.
+//! The base and the tool that a program tells the toolbox: `DHRobot(links, tool=transl(0, 0, 0.1), base=SE3.Rx(pi/2))`,
+//! `robot.tool = ...`.
 //!
-//! In: code, and the names that it sets to numbers. Out: both as transforms where they are products of shifts and turns by numbers, and a
-//! sentence about each. What goes wrong: one that cannot be followed is said with its line, for the robot's frames are then not the program's.
+//! In: code, and the names that it sets to numbers. Out: both as transforms where they are products of shifts and turns
+//! by numbers, and a sentence about each. What goes wrong: one that cannot be followed is said with its line, for the
+//! robot's frames are then not the program's.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -49,8 +51,8 @@ pub(super) fn of(code: &str, known: &Known) -> ([Option<End>; 2], Vec<String>) {
     (ends, said)
 }
 
-/// The last thing that is told to be the base or the tool, in a call that makes a robot, or of a robot; and whether nothing else is. `None` and an argument
-/// of the same name that nothing in the text sets say nothing.
+/// The last thing that is told to be the base or the tool, in a call that makes a robot, or of a robot; and whether
+/// nothing else is. `None` and an argument of the same name that nothing in the text sets say nothing.
 fn told<'a>(code: &'a str, name: &str) -> Option<(u64, &'a str, bool)> {
     let found = code.match_indices(name).filter_map(|(at, _)| {
         let before = &code[..at];

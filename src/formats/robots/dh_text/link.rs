@@ -87,7 +87,8 @@ impl Link {
     }
 }
 
-/// The convention that the calls of links say, those that say nothing being classic beside others; where they contradict each other, how.
+/// The convention that the calls of links say, those that say nothing being classic beside others; where they
+/// contradict each other, how.
 pub(super) fn convention(links: &[Link]) -> Result<Option<Convention>, String> {
     let calls = || links.iter().filter(|link| link.call);
     let is_modified = |link: &&Link| link.convention == Some(Convention::Modified);

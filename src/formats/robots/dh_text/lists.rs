@@ -1,5 +1,5 @@
-//! Lists of numbers in the text of programs, `a = [0, 0.4]`, and the links of one list a parameter; parameters with the number of their link or
-//! joint in the name, `alpha0: 0, a0: 0, d1: 0.3, q2: q2 - pi/2`, and theirs.
+//! Lists of numbers in the text of programs, `a = [0, 0.4]`, and the links of one list a parameter; parameters with the
+//! number of their link or joint in the name, `alpha0: 0, a0: 0, d1: 0.3, q2: q2 - pi/2`, and theirs.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,8 @@ pub(super) type Lists = [Option<(u64, Vec<Value>)>; 4];
 /// Parts of a list's name that make it one of something else.
 const OTHERS: [&str; 9] = ["delta", "error", "err", "std", "min", "max", "lim", "limits", "diff"];
 
-/// The numbers of a list, `[0, pi/2]`, `np.array([0 1])`, `np.deg2rad([0, 90])`, `[0 90]*pi/180`; `None` where it is none.
+/// The numbers of a list, `[0, pi/2]`, `np.array([0 1])`, `np.deg2rad([0, 90])`, `[0 90]*pi/180`; `None` where it is
+/// none.
 pub(super) fn list(value: &str, known: &Known) -> Option<Vec<Value>> {
     let value = value.trim_start();
     let open = value.find(['[', '{'])?;
@@ -38,7 +39,8 @@ pub(super) fn list(value: &str, known: &Known) -> Option<Vec<Value>> {
     numbers.map(|list| list.into_iter().map(times).collect())
 }
 
-/// What a list is multiplied with behind its bracket; a unit by name leaves it as it is. `None` where that is no number.
+/// What a list is multiplied with behind its bracket; a unit by name leaves it as it is. `None` where that is no
+/// number.
 fn factor(behind: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<Value> {
     let behind = behind.trim_start_matches([')', ' ']);
     let behind = behind[..extent(behind)].trim_start_matches('.').trim_end();
@@ -113,7 +115,8 @@ pub(super) fn numbered(word: &str) -> Option<(usize, usize)> {
     Some((which.or((name == "q").then_some(2))?, number))
 }
 
-/// The links, where alpha, a and d of all joints are there: a link's numbers from 0 beside joints from 1 are those of the link before the joint.
+/// The links, where alpha, a and d of all joints are there: a link's numbers from 0 beside joints from 1 are those of
+/// the link before the joint.
 pub(super) fn numbered_links(numbered: &Numbered) -> (Vec<Link>, Option<Convention>) {
     let [alpha, a, theta, d] = numbered;
     let from = |of: &BTreeMap<usize, (u64, Value)>| of.keys().next().copied();

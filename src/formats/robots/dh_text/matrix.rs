@@ -1,7 +1,8 @@
 //! A table in brackets in the text of a program, a row a joint, with the order of its columns in a comment.
 //!
-//! In: text, and what its names stand for. Out: the rows of the one table in it. What goes wrong: a row with a word that stands for no number, a line inside
-//! of the table's brackets that is no row, and two tables; all refused with the line, since a row less is another robot.
+//! In: text, and what its names stand for. Out: the rows of the one table in it. What goes wrong: a row with a word
+//! that stands for no number, a line inside of the table's brackets that is no row, and two tables; all refused with
+//! the line, since a row less is another robot.
 
 use super::comments;
 use super::link::{Known, Wrong};
@@ -37,7 +38,8 @@ enum Line<'a> {
     Other { code: &'a str, list: bool },
 }
 
-/// The longest run of lines that hold `width` numbers each, or where there is none of lists in one line; none where there are fewer than two.
+/// The longest run of lines that hold `width` numbers each, or where there is none of lists in one line; none where
+/// there are fewer than two.
 pub fn matrix(text: &str, known: &Known, width: usize) -> Result<Option<Matrix>, Wrong> {
     match of_lines(&(1..).zip(text.lines()).collect::<Vec<_>>(), known, width)? {
         None => of_lines(&apart(text), known, width),
@@ -61,7 +63,8 @@ fn behind_list(text: &str) -> Option<usize> {
     })
 }
 
-/// The lines of a text with their numbers, those with lists in a list cut behind each; those of JSON wherever its lines end.
+/// The lines of a text with their numbers, those with lists in a list cut behind each; those of JSON wherever its lines
+/// end.
 fn apart(text: &str) -> Vec<(u64, &str)> {
     let whole =
         if text.trim_start().starts_with(['[', '{']) { vec![text] } else { text.split_inclusive('\n').collect() };

@@ -1,7 +1,9 @@
-//! Links that a program makes more often than they stand in its text: `[RevoluteDH(a=0.3)] * 3`, a comprehension, a loop.
+//! Links that a program makes more often than they stand in its text: `[RevoluteDH(a=0.3)] * 3`, a comprehension, a
+//! loop.
 //!
-//! In: code, and the links that its calls make. Out: the code with a list of calls that a whole number multiplies written out, and a refusal with the line
-//! of any other. What goes wrong: a function that makes links and is called several times is not seen.
+//! In: code, and the links that its calls make. Out: the code with a list of calls that a whole number multiplies
+//! written out, and a refusal with the line of any other. What goes wrong: a function that makes links and is called
+//! several times is not seen.
 
 use super::added::is_link;
 use super::link::{CALLS, Link, Wrong, calls, makes};

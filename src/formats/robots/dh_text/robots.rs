@@ -1,7 +1,7 @@
 //! Several robots that one text makes.
 //!
-//! In: code, and the lines of its links. Out: a refusal that names the robots where the links are of more than one. What goes wrong: robots that are made
-//! without a call of a toolbox are not told apart.
+//! In: code, and the lines of its links. Out: a refusal that names the robots where the links are of more than one.
+//! What goes wrong: robots that are made without a call of a toolbox are not told apart.
 
 use std::collections::BTreeSet;
 

@@ -1,7 +1,7 @@
 //! What stands in a text one behind the other: parameters with their values, links, lists, and numbers that get names.
 //!
-//! In: code without comments. Out: what the links are made from. What goes wrong: a value that is no number, and a joint that slides where only a call
-//! of a toolbox says it.
+//! In: code without comments. Out: what the links are made from. What goes wrong: a value that is no number, and a
+//! joint that slides where only a call of a toolbox says it.
 
 use std::collections::BTreeMap;
 

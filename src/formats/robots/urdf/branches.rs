@@ -33,8 +33,8 @@ impl Urdf {
         joints.filter(|joint| joint.kind != Kind::Fixed).map(|joint| joint.name.as_str()).collect()
     }
 
-    /// The end of the longest chain, where all other ends hang on it or a name tells, or the arm's end beside that of a finger; none where others are
-    /// arms too.
+    /// The end of the longest chain, where all other ends hang on it or a name tells, or the arm's end beside that of a
+    /// finger; none where others are arms too.
     pub(super) fn flange(&self) -> Result<String> {
         let ends = self.ends();
         let longest = ends.iter().map(|e| self.moving(e).len()).max().unwrap_or(0);
@@ -70,7 +70,8 @@ impl Urdf {
         grips(joint) || self.joints.iter().filter(|j| j.name == joint).any(|j| moves(&j))
     }
 
-    /// The end of the arm where the longest chain goes on from there with a finger alone; none where more than one could be it.
+    /// The end of the arm where the longest chain goes on from there with a finger alone; none where more than one
+    /// could be it.
     fn before_finger<'a>(&self, longest: &str, ends: &'a [String]) -> Option<&'a String> {
         let all = self.moving(longest);
         let is_before = |end: &&String| {
@@ -85,7 +86,8 @@ impl Urdf {
         before.next().filter(|_| before.next().is_none())
     }
 
-    /// What the user must know of a tip that nobody named: joints of branches that fork off behind a joint of its chain, and a last one that is a finger's.
+    /// What the user must know of a tip that nobody named: joints of branches that fork off behind a joint of its
+    /// chain, and a last one that is a finger's.
     pub(super) fn left_out(&self, tip: &str) -> Vec<String> {
         let taken = self.moving(tip);
         let mut said = Vec::new();

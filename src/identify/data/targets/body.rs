@@ -1,8 +1,9 @@
 //! The rigid body that several targets make: where they stand to each other, and where it is at a pose.
 //!
-//! In: what each pose showed of the targets. Out: their places in a frame of the body, and for a pose the transform into the sensor's
-//! frame with its covariance and chi-squared. The first places come from the medians of the distances between targets (classical scaling,
-//! Torgerson 1952), so that gross errors at a minority of poses don't count; then poses and places are fitted in turn.
+//! In: what each pose showed of the targets. Out: their places in a frame of the body, and for a pose the transform
+//! into the sensor's frame with its covariance and chi-squared. The first places come from the medians of the distances
+//! between targets (classical scaling, Torgerson 1952), so that gross errors at a minority of poses don't count; then
+//! poses and places are fitted in turn.
 
 use nalgebra::{DMatrix, Matrix3, Matrix6, Point3, SymmetricEigen, Vector3, Vector6};
 
@@ -213,8 +214,8 @@ fn are_on_a_line<'a>(places: impl Iterator<Item = &'a Vector3<f64>> + Clone) -> 
     sizes[1] <= LINE * sizes[2]
 }
 
-/// The targets, from each as a start one after the other, whose distances to all taken before are known; of all starts the most, and of as many
-/// those that were seen most often.
+/// The targets, from each as a start one after the other, whose distances to all taken before are known; of all starts
+/// the most, and of as many those that were seen most often.
 fn largest_joined(distances: &DMatrix<Option<f64>>, seen: &[usize]) -> Vec<usize> {
     let count = distances.nrows();
     let from = |start: usize| {

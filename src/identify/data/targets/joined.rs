@@ -1,9 +1,10 @@
 //! Several targets of which no pose shows two: each row is a point of one body, and the robot alone joins them.
 //!
-//! In: rows with the names of their targets, and the nominal robot. Out: the same rows as points of a body, where its targets stand as the
-//! nominal robot tells, and for each row what a target that stands elsewhere would move. The places are as good as that robot; what they
-//! are off by is solved with its parameters, by unknowns that all rows of a target share.
-//! What goes wrong: a target with few rows says little; a placement of the sensor that shows only some of the targets joins none of them.
+//! In: rows with the names of their targets, and the nominal robot. Out: the same rows as points of a body, where its
+//! targets stand as the nominal robot tells, and for each row what a target that stands elsewhere would move. The
+//! places are as good as that robot; what they are off by is solved with its parameters, by unknowns that all rows of a
+//! target share. What goes wrong: a target with few rows says little; a placement of the sensor that shows only some of
+//! the targets joins none of them.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +17,8 @@ use crate::measurements::{Measurement, Observed};
 use crate::robot::Robot;
 use crate::robot::tool_fit::Start;
 
-/// Rows of the target that has most, in the placement that shows it most often: three numbers each against placement and tool.
+/// Rows of the target that has most, in the placement that shows it most often: three numbers each against placement
+/// and tool.
 const FEWEST: usize = 6;
 
 /// Rows of it in any other placement, where the tool is known.
@@ -25,7 +27,8 @@ const FEWEST_PLACED: usize = 4;
 /// Rows of any other target: as many numbers as its place has, and more.
 const FEWEST_OF_OTHER: usize = 2;
 
-/// Standard deviation of a place's coordinate, as a multiple of what the nominal robot is off by in the middle of the rows, and mm at the least.
+/// Standard deviation of a place's coordinate, as a multiple of what the nominal robot is off by in the middle of the
+/// rows, and mm at the least.
 const SIGMA_OVER_ROBOT: f64 = 3.0;
 const LEAST_SIGMA_MM: f64 = 0.5;
 
@@ -77,8 +80,8 @@ impl Joined {
         Some(Joined { rows: rows.iter().map(of_body).collect(), targets, sensor_from_base, sigma_mm })
     }
 
-    /// What the point of a pose of this group gains, mm, from each coordinate of each part's place that is off by a standard deviation, the pose
-    /// showing the part that stands there on the body.
+    /// What the point of a pose of this group gains, mm, from each coordinate of each part's place that is off by a
+    /// standard deviation, the pose showing the part that stands there on the body.
     pub fn columns(
         &self,
         group: &str,
@@ -97,8 +100,8 @@ impl Joined {
     }
 }
 
-/// Rows of one target each as points of a body, whose targets' places on the flange an earlier identification joined; `None` where there is one target,
-/// or one that it does not know.
+/// Rows of one target each as points of a body, whose targets' places on the flange an earlier identification joined;
+/// `None` where there is one target, or one that it does not know.
 pub fn of_places(
     rows: &[Measurement],
     places_mm: &BTreeMap<String, Vector3<f64>>,
@@ -121,7 +124,8 @@ pub fn of_places(
     is_several.then_some((of_body, targets))
 }
 
-/// Where the base stands at the sensor, by group, from what one target shows, and what the nominal robot is off by in the middle of the rows, mm.
+/// Where the base stands at the sensor, by group, from what one target shows, and what the nominal robot is off by in
+/// the middle of the rows, mm.
 fn placements(seen: &[Seen], nominal: &Robot) -> Option<(BTreeMap<String, Transform>, f64)> {
     let mut groups: BTreeMap<&str, Vec<&Seen>> = BTreeMap::new();
     for row in seen {

@@ -1,9 +1,9 @@
 //! Several targets at each pose, told apart by the column `target`, made one: a point and an orientation.
 //!
-//! In: rows with the names of their targets. Out: one row a pose, its mark point the mean of all targets, its orientation that of the body
-//! that they make, and what was found wrong at poses where the targets do not stand to each other as elsewhere. Targets on a line, or
-//! two, tell no turn about it: then there is the mean alone. A pose that shows fewer than that takes is a point of the body: the mean of what
-//! it shows, and where that stands on the body.
+//! In: rows with the names of their targets. Out: one row a pose, its mark point the mean of all targets, its
+//! orientation that of the body that they make, and what was found wrong at poses where the targets do not stand to
+//! each other as elsewhere. Targets on a line, or two, tell no turn about it: then there is the mean alone. A pose that
+//! shows fewer than that takes is a point of the body: the mean of what it shows, and where that stands on the body.
 //! What a robot does wrong at a pose, all its targets share; as rows of their own they would count it several times.
 //! What goes wrong: targets that are no rigid body, or that neither a pose nor the robot joins; both are errors.
 
@@ -30,14 +30,16 @@ pub struct Targets {
     pub names: Vec<String>,
     /// Root mean square of a coordinate's residual against the body, mm; `null` where no pose shows two of them.
     pub scatter_mm: Option<f64>,
-    /// Where they stand in a frame of their own, whose origin is the mark point, mm; `null` for one that no pose joins to the others.
+    /// Where they stand in a frame of their own, whose origin is the mark point, mm; `null` for one that no pose joins
+    /// to the others.
     pub places_mm: Vec<Option<[f64; 3]>>,
     /// Standard deviation of a place's coordinate, mm, where the nominal robot joined the targets.
     #[serde(skip)]
     pub place_sigma_mm: Option<f64>,
     /// Whether they tell an orientation.
     pub oriented: bool,
-    /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that stands, mm.
+    /// Poses that show too few of them for a turn: points of the body, by the names of what they show, and where that
+    /// stands, mm.
     pub parts: BTreeMap<String, Part>,
     /// Targets that moved by less than a robot repeats to: nothing was done about them.
     #[serde(skip)]
@@ -75,7 +77,8 @@ impl Targets {
         } + &self.slightly_moved.as_ref().map_or_else(String::new, |moved| format!("; {moved}"))
     }
 
-    /// The same with the places as they were solved: the unknowns of [`super::Joined::columns`], by the parts in the order of their names.
+    /// The same with the places as they were solved: the unknowns of [`super::Joined::columns`], by the parts in the
+    /// order of their names.
     pub fn solved(mut self, unknowns: &[(Extra, f64)]) -> Targets {
         let Some(place_sigma_mm) = self.place_sigma_mm else { return self };
         let names: Vec<String> = self.parts.keys().cloned().collect();
@@ -181,12 +184,14 @@ fn sightings(poses: &[Shown]) -> Vec<Vec<Sighting>> {
     poses.iter().map(|pose| pose.sightings.clone()).collect()
 }
 
-/// Makes targets that moved others from there on; each with the index that it has from there on. One that moved by less than a robot repeats to
-/// stays what it is, and what is said of it is the other: as another target it would cost orientations, and as the same one hardly anything.
+/// Makes targets that moved others from there on; each with the index that it has from there on. One that moved by less
+/// than a robot repeats to stays what it is, and what is said of it is the other: as another target it would cost
+/// orientations, and as the same one hardly anything.
 fn told_apart(poses: &mut [Shown], names: &mut Vec<String>) -> (Vec<(Moved, usize)>, Option<String>) {
     let (mut list, mut slight) = (Vec::new(), Vec::new());
     let most = names.len();
-    // While it is searched on, one that hardly moved is another as well, so that it hides no other step: which target each is, and from which pose on.
+    // While it is searched on, one that hardly moved is another as well, so that it hides no other step: which target
+    // each is, and from which pose on.
     let mut seen = sightings(poses);
     let mut parts: Vec<(usize, usize)> = (0..most).map(|target| (target, 0)).collect();
     while list.len() + slight.len() < most {

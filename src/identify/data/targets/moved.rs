@@ -1,9 +1,10 @@
 //! Targets that were moved between two poses: from there on their distances to the others are other ones.
 //!
-//! In: what the poses showed, in their order. Out: the same with a target that moved as another one from there on. Each distance between two
-//! targets is looked through for a step, held against what it changes from one pose to the next; large deviations are bounded, so that gross
-//! errors make none. The target in most of the distances that step is the one that moved. Steps of less than about three times the
-//! scatter, and within the first or last few poses, are not seen.
+//! In: what the poses showed, in their order. Out: the same with a target that moved as another one from there on. Each
+//! distance between two targets is looked through for a step, held against what it changes from one pose to the next;
+//! large deviations are bounded, so that gross errors make none. The target in most of the distances that step is the
+//! one that moved. Steps of less than about three times the scatter, and within the first or last few poses, are not
+//! seen.
 
 use super::body::{LEAST_SCATTER, Sighting, distances};
 use crate::statistics::median;
@@ -76,7 +77,8 @@ pub fn next(poses: &[Vec<Sighting>], targets: usize) -> Option<Moved> {
     (most_steps > 0).then_some(Moved { target, or, from })
 }
 
-/// How clear the clearest step is, and the pose after it; of those before this pose alone, however clear, where one is given.
+/// How clear the clearest step is, and the pose after it; of those before this pose alone, however clear, where one is
+/// given.
 fn step(distances: &[(usize, f64)], only: Option<usize>) -> Option<(f64, usize)> {
     let count = distances.len();
     let middle = median(distances.iter().map(|d| d.1))?;

@@ -1,8 +1,9 @@
 //! Which poses show the targets standing to each other as at the others, and what those tell.
 //!
-//! In: the body that the targets make, and a pose's sightings. Out: the mark point and the orientation, with two names exchanged or one target
-//! left out where that alone makes them fit, or why they are not to be had. A pose is held against the median pose, and its limit is one that
-//! one clean set in a thousand exceeds somewhere. Goes wrong: an exchange that leaves the lengths between the targets alike is not seen.
+//! In: the body that the targets make, and a pose's sightings. Out: the mark point and the orientation, with two names
+//! exchanged or one target left out where that alone makes them fit, or why they are not to be had. A pose is held
+//! against the median pose, and its limit is one that one clean set in a thousand exceeds somewhere. Goes wrong: an
+//! exchange that leaves the lengths between the targets alike is not seen.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -65,7 +66,8 @@ impl Sorter {
         sorter
     }
 
-    /// Chi-squared of a pose and its degrees of freedom: of all six numbers of a pose, or on a line of the distances along it.
+    /// Chi-squared of a pose and its degrees of freedom: of all six numbers of a pose, or on a line of the distances
+    /// along it.
     fn chi_square(&self, pose: &[Sighting]) -> Option<(f64, usize)> {
         if self.body.is_line() {
             return self.chi_square_along(pose);
@@ -102,8 +104,8 @@ impl Sorter {
         self.chi_square(pose).is_some_and(|(chi_square, freedom)| chi_square <= self.limit(freedom))
     }
 
-    /// Chi-squared that one clean pose in very many exceeds. Where nothing says how the noise is spread over the directions, it may all lie in
-    /// one.
+    /// Chi-squared that one clean pose in very many exceeds. Where nothing says how the noise is spread over the
+    /// directions, it may all lie in one.
     fn limit(&self, freedom: usize) -> f64 {
         let at = |freedom: f64| chi_square_quantile(freedom, self.normal);
         let middle = |freedom: f64| chi_square_quantile(freedom, 0.0);
@@ -111,7 +113,8 @@ impl Sorter {
         self.variance * if self.stated { at(freedom) } else { middle(freedom) * at(1.0) / middle(1.0) }
     }
 
-    /// Root mean square of a coordinate's residual over the poses that fit, mm, the freedom that the poses' fits used taken into account.
+    /// Root mean square of a coordinate's residual over the poses that fit, mm, the freedom that the poses' fits used
+    /// taken into account.
     pub(super) fn scatter_mm(&self, poses: &[Vec<Sighting>]) -> f64 {
         let plain = |pose: &Vec<Sighting>| -> Vec<Sighting> {
             pose.iter().map(|s| Sighting { precision: Matrix3::identity(), ..*s }).collect()

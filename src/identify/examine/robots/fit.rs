@@ -1,9 +1,10 @@
 //! Robots fitted to parts of the rows: one for all of them, or one a part.
 //!
-//! In: the nominal robot, and points with their joints, cut into parts. Out: what is left, how many numbers the unknowns took, and the scatter
-//! that follows. Each placement of each part, and the target's place in each part, are unknowns of their own in either case, so that a sensor or
-//! a tool that was moved between parts costs one robot nothing. Gauss and Newton's steps with the placements eliminated; the links are held by
-//! a loose prior. Goes wrong: parts whose rows are no more than their unknowns; they leave nothing, and count no degrees of freedom.
+//! In: the nominal robot, and points with their joints, cut into parts. Out: what is left, how many numbers the
+//! unknowns took, and the scatter that follows. Each placement of each part, and the target's place in each part, are
+//! unknowns of their own in either case, so that a sensor or a tool that was moved between parts costs one robot
+//! nothing. Gauss and Newton's steps with the placements eliminated; the links are held by a loose prior. Goes wrong:
+//! parts whose rows are no more than their unknowns; they leave nothing, and count no degrees of freedom.
 
 use std::collections::BTreeSet;
 
@@ -15,7 +16,8 @@ use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
 use crate::robot::{Parameter, Robot, Unit};
 use crate::statistics::median;
 
-/// How far links are built from their file, mm and mrad, and how far the target may stand from where the file has it, mm: loose.
+/// How far links are built from their file, mm and mrad, and how far the target may stand from where the file has it,
+/// mm: loose.
 const LINK: [f64; 2] = [3.0, 10.0];
 const TARGET_MM: f64 = 1000.0;
 
@@ -36,8 +38,8 @@ const WHOLE: f64 = 1.5;
 pub(super) const PLACEMENT: usize = 6;
 pub(super) const TARGET: usize = 3;
 
-/// Steps of a joint's zero by which its best value is found, rad and mm, and times that it is looked for anew around the best: far from it the squares
-/// are no parabola.
+/// Steps of a joint's zero by which its best value is found, rad and mm, and times that it is looked for anew around
+/// the best: far from it the squares are no parabola.
 const ZERO_STEP: [f64; 2] = [1e-3, 0.5];
 const VERTICES: usize = 3;
 
@@ -57,7 +59,8 @@ pub(super) struct Points {
     pub(super) groups: Vec<usize>,
     /// Of each row, which of several tools it is of, from 0; empty where all are of one.
     pub(super) tools: Vec<usize>,
-    /// Of each row, whether it is under the load whose weight on the joints is among the parameters; empty where there is none.
+    /// Of each row, whether it is under the load whose weight on the joints is among the parameters; empty where there
+    /// is none.
     pub(super) loaded: Vec<bool>,
 }
 
@@ -86,8 +89,9 @@ impl Left {
         (self.squares / self.freedom()).sqrt()
     }
 
-    /// The logarithm of the likelihood of a cause that took so many numbers of so many rows, but for a constant. The three coordinates of a row share what
-    /// the model lacks, and count as one number; what is free costs as Schwarz has it.
+    /// The logarithm of the likelihood of a cause that took so many numbers of so many rows, but for a constant. The
+    /// three coordinates of a row share what the model lacks, and count as one number; what is free costs as Schwarz
+    /// has it.
     pub(super) fn likelihood(&self, rows: usize, free: f64) -> f64 {
         let numbers = TARGET as f64 * rows as f64;
         -(numbers * self.squares.max(f64::MIN_POSITIVE).ln() + free * numbers.ln()) / 6.0
@@ -119,8 +123,8 @@ impl Points {
         self.solved(parts, weights).0
     }
 
-    /// The same, and where it ends. A part by itself hardly tells its tool from its placement, and from a file that is far off the steps may end
-    /// in between: so from the robot of all rows with one tool as well.
+    /// The same, and where it ends. A part by itself hardly tells its tool from its placement, and from a file that is
+    /// far off the steps may end in between: so from the robot of all rows with one tool as well.
     pub(super) fn solved(&self, parts: &[Vec<usize>], weights: &[f64]) -> (Left, DVector<f64>) {
         let from = |parts: &[Vec<usize>], start| self.fitted(parts, start, STEPS, weights.to_vec(), &mut |_, _| ());
         let of_file = from(parts, self.at_file(parts));
@@ -180,8 +184,9 @@ impl Points {
         if self.robot.joints[joint].slides { format!("{off:.3} mm") } else { format!("{:.3} deg", off.to_degrees()) }
     }
 
-    /// What one robot for these rows leaves where a joint stands elsewhere in some, by as much as leaves least, and how far that is, rad (mm); `never` is
-    /// what it leaves where the joint does not. Squares of errors are a parabola of that.
+    /// What one robot for these rows leaves where a joint stands elsewhere in some, by as much as leaves least, and how
+    /// far that is, rad (mm); `never` is what it leaves where the joint does not. Squares of errors are a parabola of
+    /// that.
     pub(super) fn elsewhere(
         &self,
         joint: usize,
@@ -227,7 +232,8 @@ impl Points {
         DVector::zeros(self.parameters.len() + TARGET * (parts.len() - 1 + self.further_tools()))
     }
 
-    /// What one robot leaves after so many steps, and where it ends; `weigh` hears the errors after each step and changes the weights of all rows.
+    /// What one robot leaves after so many steps, and where it ends; `weigh` hears the errors after each step and
+    /// changes the weights of all rows.
     fn fitted(
         &self,
         parts: &[Vec<usize>],
@@ -281,7 +287,8 @@ impl Points {
         (left, step.column(0).into_owned())
     }
 
-    /// One robot for these rows with common placements, where each row's target is taken by the load if it is under it, and how far that is, mm.
+    /// One robot for these rows with common placements, where each row's target is taken by the load if it is under it,
+    /// and how far that is, mm.
     pub(super) fn under_load(&self, rows: &[usize], weights: &[f64]) -> (Left, Vec<Vector3<f64>>) {
         let parts = [rows.to_vec()];
         let (left, x) = self.fitted(&parts, self.at_file(&parts), STEPS, weights.to_vec(), &mut |_, _| ());
@@ -338,8 +345,8 @@ impl Points {
         (0..TARGET).map(|axis| columns.column(axis) * offsets[at + axis]).sum()
     }
 
-    /// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual; how many numbers were measured
-    /// beyond those of the placements, and each row's error, mm.
+    /// The normal equations of a part, its placements eliminated: of all parameters, and behind them of the residual;
+    /// how many numbers were measured beyond those of the placements, and each row's error, mm.
     fn normal(
         &self,
         part: &[usize],

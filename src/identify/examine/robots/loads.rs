@@ -1,11 +1,13 @@
 //! A load that hung on the flange in some of the rows, and bent the joints there.
 //!
-//! In: the fitted rows, and the robot of the file. Out: which rows are under the load, where they come in any order. Method: each joint turns by
-//! a compliance of its own times the torque that a weight at the target has about it. The rows whose errors have most of that are under the load at
-//! first, and then those that it brings nearer, until no row changes. One robot with the load in these rows is held against one with the load in
-//! all of them and in none, by Fisher's test and by what is left, as of robots, and against one with any term beyond its links. Goes wrong: loads that move the target by less than about three
-//! times what the readings scatter by; two states by anything else that yields along gravity, as a brake or the air in a cylinder. The zero of one
-//! joint, which stands elsewhere in some rows for the play of its gear, is held against the load by likelihood.
+//! In: the fitted rows, and the robot of the file. Out: which rows are under the load, where they come in any order.
+//! Method: each joint turns by a compliance of its own times the torque that a weight at the target has about it. The
+//! rows whose errors have most of that are under the load at first, and then those that it brings nearer, until no row
+//! changes. One robot with the load in these rows is held against one with the load in all of them and in none, by
+//! Fisher's test and by what is left, as of robots, and against one with any term beyond its links. Goes wrong: loads
+//! that move the target by less than about three times what the readings scatter by; two states by anything else that
+//! yields along gravity, as a brake or the air in a cylinder. The zero of one joint, which stands elsewhere in some
+//! rows for the play of its gear, is held against the load by likelihood.
 
 use nalgebra::Vector3;
 
@@ -144,7 +146,8 @@ fn nearer(errors_mm: &[Vector3<f64>], moved_mm: &[Vector3<f64>], there: &[bool])
     (0..there.len()).map(is_nearer).collect()
 }
 
-/// Rows whose errors have the larger amounts of how a load in all of them would move the target: of two means of the amounts the larger one's.
+/// Rows whose errors have the larger amounts of how a load in all of them would move the target: of two means of the
+/// amounts the larger one's.
 fn by_amount(errors_mm: &[Vector3<f64>], along: &[Vector3<f64>]) -> Vec<bool> {
     let amount = |(error, along): (&Vector3<f64>, &Vector3<f64>)| {
         let weight = along.norm_squared();
@@ -165,15 +168,16 @@ fn by_amount(errors_mm: &[Vector3<f64>], along: &[Vector3<f64>]) -> Vec<bool> {
     amounts.into_iter().map(|(amount, _)| amount >= limit).collect()
 }
 
-/// The rows that are under a load, what one robot leaves with it, and how far it moves each row's target where it is under it.
+/// The rows that are under a load, what one robot leaves with it, and how far it moves each row's target where it is
+/// under it.
 struct States {
     loaded: Vec<bool>,
     left: Left,
     moved_mm: Vec<Vector3<f64>>,
 }
 
-/// The states that no row changes any more; `None` where two rounds leave more than so much, which is what rows that were dealt out by their errors
-/// gain by chance.
+/// The states that no row changes any more; `None` where two rounds leave more than so much, which is what rows that
+/// were dealt out by their errors gain by chance.
 fn settled(points: &Points, weights: &[f64], mut loaded: Vec<bool>, most_mm: f64) -> Option<States> {
     let rows: Vec<usize> = (0..loaded.len()).collect();
     for round in 0..ROUNDS {

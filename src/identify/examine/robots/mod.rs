@@ -1,15 +1,16 @@
-//! Rows that are not of one robot: files of two arms in one run, or a table whose last part was measured on another arm, or after the robot was
-//! hit, repaired or mastered anew.
+//! Rows that are not of one robot: files of two arms in one run, or a table whose last part was measured on another
+//! arm, or after the robot was hit, repaired or mastered anew.
 //!
-//! In: points, and the nominal robot. Out: the parts that are each well explained by a robot of their own and not by one together, or nothing.
-//! Parts are the files of a run, or stretches of rows that are looked for. One robot with a tool and placements of its own in every part is
-//! held against a robot a part. Fisher's test says whether what that gains is beyond chance and the further unknowns (the Chow test: Chow,
-//! 1960), with the number of places that were tried counted in; what is left must fall to half at the least; and the same rows cut along any of
-//! their joints must leave more, for a model that lacks something fits better in every smaller region. One robot with any term beyond its links must
-//! leave twice as much as well.
-//! Rows that are far off by themselves are errors of their own and no part of a state: they are left out first.
-//! Goes wrong: arms that differ by less than the model lacks; parts that alternate row by row; a sensor whose own errors changed between
-//! parts, which looks like another robot; a change along the rows that a term follows, as where a joint only turned one way while it happened.
+//! In: points, and the nominal robot. Out: the parts that are each well explained by a robot of their own and not by
+//! one together, or nothing. Parts are the files of a run, or stretches of rows that are looked for. One robot with a
+//! tool and placements of its own in every part is held against a robot a part. Fisher's test says whether what that
+//! gains is beyond chance and the further unknowns (the Chow test: Chow, 1960), with the number of places that were
+//! tried counted in; what is left must fall to half at the least; and the same rows cut along any of their joints must
+//! leave more, for a model that lacks something fits better in every smaller region. One robot with any term beyond its
+//! links must leave twice as much as well. Rows that are far off by themselves are errors of their own and no part of a
+//! state: they are left out first. Goes wrong: arms that differ by less than the model lacks; parts that alternate row
+//! by row; a sensor whose own errors changed between parts, which looks like another robot; a change along the rows
+//! that a term follows, as where a joint only turned one way while it happened.
 
 mod fit;
 pub(super) mod loads;
@@ -135,7 +136,8 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> Option<Robots>
     Some(Robots { parts: table.parts(set, &parts, &compared), together_mm: compared.together.scatter_mm() })
 }
 
-/// What is said of files of which each has far less error by itself than with the others, though no tool and no placement tells them apart.
+/// What is said of files of which each has far less error by itself than with the others, though no tool and no
+/// placement tells them apart.
 pub(super) fn of_files(set: &Dataset, robot: &Robot) -> Option<Finding> {
     let mut table = Table::new(set, robot)?;
     let files = Some(table.files(set)).filter(|files| files.len() > 1)?;
@@ -159,8 +161,8 @@ fn alone(parts: &[Part]) -> String {
     parts.iter().map(|p| format!("{} {:.3} mm", p.name, p.alone_mm)).collect::<Vec<_>>().join(", in ")
 }
 
-/// Times the median that rows which are errors of their own are off at the least, and rounds in which the target's place is found: errors of a
-/// robot vary with the posture by some times their median.
+/// Times the median that rows which are errors of their own are off at the least, and rounds in which the target's
+/// place is found: errors of a robot vary with the posture by some times their median.
 const FAR: f64 = 12.0;
 const PLACING_ROUNDS: usize = 20;
 
@@ -286,7 +288,8 @@ impl Table {
         Some((at, count as f64 * (whole.scatter_mm() / apart_mm).ln()))
     }
 
-    /// These parts where they are of different robots, as `compare` has it; `tried` is the number of such cuts that were looked at.
+    /// These parts where they are of different robots, as `compare` has it; `tried` is the number of such cuts that
+    /// were looked at.
     fn judged(&self, parts: Vec<Vec<usize>>, tried: f64, compare: Comparing) -> Option<Judged> {
         let compared = compare(self, &parts)?;
         let Compared { apart, together, .. } = &compared;
@@ -313,7 +316,8 @@ impl Table {
         Some(Compared { each, apart, together: self.points.together(parts, &weights) })
     }
 
-    /// Whether one robot with any of the terms that `identify` may keep leaves less in these parts than what is much larger than several do.
+    /// Whether one robot with any of the terms that `identify` may keep leaves less in these parts than what is much
+    /// larger than several do.
     pub(super) fn is_one_beyond_links(&self, parts: &[Vec<usize>], apart_mm: f64) -> bool {
         let robot = &self.points.robot;
         let links = Terms { chain: Chain::Mdh, ..Terms::NOMINAL };

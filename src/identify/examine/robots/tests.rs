@@ -20,7 +20,8 @@ fn arm(samples: usize, off: f64, tool_mm: f64, seed: u64) -> World {
     })
 }
 
-/// The rows of each world, as files of a run of several where `files`, else as the parts of one table that no column tells apart.
+/// The rows of each world, as files of a run of several where `files`, else as the parts of one table that no column
+/// tells apart.
 fn tables(worlds: &[World], files: bool) -> (Dataset, Robot) {
     let mut rows: Vec<Measurement> = Vec::new();
     for (k, world) in worlds.iter().enumerate() {
@@ -216,7 +217,8 @@ fn a_tool_that_moved_between_rows_or_files_is_told_with_how_far() {
     }
 }
 
-/// One target that the last joint turns moves as on a tool that was turned; a tool that went along the axis is no joint's.
+/// One target that the last joint turns moves as on a tool that was turned; a tool that went along the axis is no
+/// joint's.
 #[test]
 fn the_last_joint_is_named_beside_the_tool_where_one_target_does_not_tell_them_apart() {
     for seed in 0..3 {

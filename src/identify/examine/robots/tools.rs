@@ -1,10 +1,11 @@
 //! A tool that was moved, turned or exchanged between parts of the rows.
 //!
-//! In: the fitted rows, and the robot of the file. Out: from which row on, or between which files, the target stands elsewhere on the flange, and by
-//! how much. Method: one robot for all rows with a tool of each part's own is held against one tool for all of them, both with placements of each
-//! part's own, so that a sensor that was moved is none. Fisher's test, and the same rows cut along any joint, as of robots. Where the rows were cut
-//! into sessions, tools and placements are compared there by their likelihood. Goes wrong: parts that turn the flange too little for their tool to
-//! be told.
+//! In: the fitted rows, and the robot of the file. Out: from which row on, or between which files, the target stands
+//! elsewhere on the flange, and by how much. Method: one robot for all rows with a tool of each part's own is held
+//! against one tool for all of them, both with placements of each part's own, so that a sensor that was moved is none.
+//! Fisher's test, and the same rows cut along any joint, as of robots. Where the rows were cut into sessions, tools and
+//! placements are compared there by their likelihood. Goes wrong: parts that turn the flange too little for their tool
+//! to be told.
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -85,8 +86,8 @@ pub(in crate::identify::examine) fn find(set: &Dataset, robot: &Robot) -> Option
     Some(Moved { finding, is_placed: tools.is_placed() })
 }
 
-/// What is said of rows that were cut into sessions where something else than a sensor that moved is likelier, or not told from it: a tool, or the
-/// zero of a joint. `None` where the sensor is likelier.
+/// What is said of rows that were cut into sessions where something else than a sensor that moved is likelier, or not
+/// told from it: a tool, or the zero of a joint. `None` where the sensor is likelier.
 pub(in crate::identify::examine) fn of_sessions(set: &Dataset, cut: &Dataset, robot: &Robot) -> Option<Finding> {
     let table = Table::new(set, robot)?;
     let parts = table.sessions(set, cut);
@@ -136,8 +137,8 @@ impl Table {
         parts
     }
 
-    /// The sensor, the tool and, between two sessions, the zero of the joint that explains most, and a load. A first joint that stands elsewhere is a sensor that
-    /// turned.
+    /// The sensor, the tool and, between two sessions, the zero of the joint that explains most, and a load. A first
+    /// joint that stands elsewhere is a sensor that turned.
     fn causes(&self, parts: &[Vec<usize>]) -> Option<Vec<Cause>> {
         let tools = self.with_tools(parts)?;
         let most_mm = tools.off_mm.iter().map(Vector3::norm).fold(0.0, f64::max);
@@ -172,7 +173,8 @@ impl Table {
         Some(self.cause(parts, format!("the zero of joint {} moved by {by}", joint + 1), &left, 1.0))
     }
 
-    /// The zero of a joint that explains two parts as well as tools of their own: one target moves alike where the last joint stands elsewhere.
+    /// The zero of a joint that explains two parts as well as tools of their own: one target moves alike where the last
+    /// joint stands elsewhere.
     fn zero_as_likely(&self, tools: &Tools) -> Option<String> {
         let tool = self.cause(&tools.parts, String::new(), &tools.apart, TARGET as f64);
         let zero = self.zero(&tools.parts, tools)?;

@@ -1,8 +1,8 @@
 //! What moves along the rows of a group without a placement of its own, in words.
 //!
-//! In: the causes that explain it alike, as the search of sessions found them: what moves evenly, and the zero of a joint that steps at a row. Out: a
-//! finding where a joint is among them. Goes wrong: a joint that creeps by a degree, of which all causes are linear: a sensor that moves has more
-//! unknowns to follow the rest.
+//! In: the causes that explain it alike, as the search of sessions found them: what moves evenly, and the zero of a
+//! joint that steps at a row. Out: a finding where a joint is among them. Goes wrong: a joint that creeps by a degree,
+//! of which all causes are linear: a sensor that moves has more unknowns to follow the rest.
 
 use crate::identify::finding::Finding;
 use crate::identify::judge::recheck::zero;
@@ -21,8 +21,8 @@ pub(super) struct Moves {
     pub(super) from: Option<String>,
 }
 
-/// What is said of drifts where a joint that moves is as likely as a sensor. One that the zero of the first joint explains is a sensor's as well.
-/// Groups are named where there are `several`.
+/// What is said of drifts where a joint that moves is as likely as a sensor. One that the zero of the first joint
+/// explains is a sensor's as well. Groups are named where there are `several`.
 pub(super) fn of_joints(drifts: &[Drift], robot: &Robot, several: bool) -> Option<Finding> {
     let drift = drifts.iter().find(|drift| drift.causes.iter().any(|cause| cause.joint.is_some()))?;
     let of_joint = |cause: &Moves| {

@@ -40,7 +40,8 @@ fn an_anchor_that_moved_is_found_where_it_moved_and_gross_errors_hide_no_session
     }
 }
 
-/// Distances to the first pose, and everything but it moved by so much: evenly along the rows, or at once after 40 of them.
+/// Distances to the first pose, and everything but it moved by so much: evenly along the rows, or at once after 40 of
+/// them.
 fn to_center(moved_mm: f64, evenly: bool) -> (synthetic::World, Dataset) {
     let world = synthetic::planned(120, 20, 25.0, 0.0, 5, &|_| {});
     // The first row and those that are no centres.

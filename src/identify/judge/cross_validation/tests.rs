@@ -12,7 +12,8 @@ fn a_gain_in_every_region_counts_however_unlike_the_regions_are() {
     assert!(clearly_less(&new, &old) && !clearly_less(&old, &new));
 }
 
-/// CrossValidation of a model with two parameters seen directly, 20 rows a fold, each fold's rows off by its own amount.
+/// CrossValidation of a model with two parameters seen directly, 20 rows a fold, each fold's rows off by its own
+/// amount.
 fn direct(common: &[f64]) -> CrossValidation {
     let mut random = 1u32;
     let mut noise = || {

@@ -1,14 +1,16 @@
-//! Whether points contradict the robot that they are placed with, or the one row that contradicts the others: a point that was misread, the joints of
-//! another row.
+//! Whether points contradict the robot that they are placed with, or the one row that contradicts the others: a point
+//! that was misread, the joints of another row.
 //!
-//! In: the task of a placement, how far a coordinate of the robot is known to scatter (mm), the offsets that were found. Out: how far the points
-//! miss the robot, and what that means. Where readings state their covariance, a chi-squared that is too large is the robot's. Where they do not,
-//! how well the instrument measures is what no change of the robot's geometry explains, and only what exceeds that and the robot's known scatter is
-//! its fault (an F test: the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains nothing
-//! beyond chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt.
-//! Of a row, in: the task and how far the robot is known to scatter. Out: the row without which the others agree with the
-//! robot, and how far its point lies from where they have it. Method: each row is left out in turn; the fall of chi-squared is held against what the
-//! others scatter (an F test at one level over all rows), and against the fall by the next row. Goes wrong: of four rows any three agree.
+//! In: the task of a placement, how far a coordinate of the robot is known to scatter (mm), the offsets that were
+//! found. Out: how far the points miss the robot, and what that means. Where readings state their covariance, a
+//! chi-squared that is too large is the robot's. Where they do not, how well the instrument measures is what no change
+//! of the robot's geometry explains, and only what exceeds that and the robot's known scatter is its fault (an F test:
+//! the fit with that geometry is nested in the other, so that it errs to the side of no alarm). Where it explains
+//! nothing beyond chance, the misfit is noise. Goes wrong: what few poses cannot tell apart is a doubt. Of a row, in:
+//! the task and how far the robot is known to scatter. Out: the row without which the others agree with the robot, and
+//! how far its point lies from where they have it. Method: each row is left out in turn; the fall of chi-squared is
+//! held against what the others scatter (an F test at one level over all rows), and against the fall by the next row.
+//! Goes wrong: of four rows any three agree.
 
 use nalgebra::Point3;
 use serde::Serialize;

@@ -121,7 +121,8 @@ fn a_row_that_alone_contradicts_the_others_is_named_and_left_out() {
     );
 }
 
-/// An instrument about which nothing is stated may be as coarse as it is: only what a robot's geometry explains beyond that speaks against the robot.
+/// An instrument about which nothing is stated may be as coarse as it is: only what a robot's geometry explains beyond
+/// that speaks against the robot.
 #[test]
 fn noise_that_nobody_stated_is_no_fault_of_the_robot() {
     let trust = Trust { point_mm: REPEATABILITY_MM, rotation_rad: None };
@@ -157,7 +158,8 @@ fn poses_that_tell_too_little_are_refused_with_what_is_open() {
         locate(&set, &truth, EXACT, None, &Settings::default()).unwrap_err().to_string()
     };
     assert!(refused(&all[..2]).contains("has 2 poses with a point; a placement takes 3"));
-    // One axis turns: the cameras and the target may move along it together, or turn about it together. Either is named.
+    // One axis turns: the cameras and the target may move along it together, or turn about it together. Either is
+    // named.
     let mut one_axis = all[..4].to_vec();
     for (k, row) in one_axis.iter_mut().enumerate() {
         row.at.joints_deg = all[0].at.joints_deg.clone();
@@ -205,7 +207,8 @@ fn covariances_grow_by_what_the_scatter_of_few_poses_leaves_open() {
     assert!((grown - (3.182f64 / 1.960).powi(2)).abs() < 0.01, "{grown}");
 }
 
-/// Of a robot that was identified, what that left open moves placements and fresh points by more than the noise of the rows does.
+/// Of a robot that was identified, what that left open moves placements and fresh points by more than the noise of the
+/// rows does.
 #[test]
 fn what_an_identification_left_open_is_in_the_intervals() {
     let mut shares = Vec::new();

@@ -1,4 +1,5 @@
-//! The new rows at the old robot: residuals that no placement reaches, what they are known to, and the columns of what may have changed.
+//! The new rows at the old robot: residuals that no placement reaches, what they are known to, and the columns of what
+//! may have changed.
 
 use std::ops::Range;
 
@@ -96,8 +97,8 @@ impl Compared<'_> {
         Some(Look { difference, columns })
     }
 
-    /// By how much the squared residuals of each row, by its index in the set, shrink those of all where the row is left out: as if its residuals
-    /// were free. Exact where all is linear.
+    /// By how much the squared residuals of each row, by its index in the set, shrink those of all where the row is
+    /// left out: as if its residuals were free. Exact where all is linear.
     pub(super) fn gains(&self) -> Vec<(usize, f64)> {
         let linear = Linearised::new(self.rows, &self.offsets(&vec![0.0; self.count]));
         let (nuisance, all) = stacked(&linear, self.count);
@@ -136,8 +137,8 @@ impl Compared<'_> {
     }
 }
 
-/// The rows with a scale of the sensor as an unknown, the target's turn where orientations are used, and where targets stand that the robot alone
-/// joined: that is known no better than the robot is.
+/// The rows with a scale of the sensor as an unknown, the target's turn where orientations are used, and where targets
+/// stand that the robot alone joined: that is known no better than the robot is.
 pub(super) fn rows(
     set: &Dataset,
     robot: &Robot,
@@ -166,7 +167,8 @@ pub(super) fn rows(
     task.rows_at(Scatter { rotation_rad, ..Scatter::of_point(trust.point_mm) }, robot)
 }
 
-/// What a millimetre of each coordinate of each place moves the point of each pose by, where the robot alone joined the targets; no columns elsewhere.
+/// What a millimetre of each coordinate of each place moves the point of each pose by, where the robot alone joined the
+/// targets; no columns elsewhere.
 fn places(set: &Dataset, robot: &Robot) -> Vec<Matrix3xX<f64>> {
     let mut parts: Vec<Vector3<f64>> = Vec::new();
     for place in set.poses.iter().filter_map(|pose| pose.on_body_mm).filter(|_| set.are_on_flange()) {
@@ -196,7 +198,8 @@ fn root(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     shared::root(0.5 * (covariance + covariance.transpose()))
 }
 
-/// White residuals with the columns of the first so many offsets, behind the columns of the target's turn and the placements.
+/// White residuals with the columns of the first so many offsets, behind the columns of the target's turn and the
+/// placements.
 fn stacked(linear: &Linearised, count: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let total: usize = linear.placements.iter().map(|p| p.linear.residuals.len()).sum();
     let turns = linear.shared - count;
@@ -222,7 +225,8 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// What a unit of each of a suspect's numbers does. Residuals are predicted less measured: a joint that stands further makes them smaller.
+    /// What a unit of each of a suspect's numbers does. Residuals are predicted less measured: a joint that stands
+    /// further makes them smaller.
     pub(super) fn directions(&self, suspect: &Suspect) -> Vec<DVector<f64>> {
         suspect.columns.iter().map(|&(at, unit)| -unit * self.columns.column(at)).collect()
     }
@@ -248,7 +252,8 @@ mod tests {
     use crate::identify::data::targets::Targets;
     use crate::identify::synthetic;
 
-    /// A place that is a millimetre off moves the points of its own target by a millimetre, as the flange is turned there.
+    /// A place that is a millimetre off moves the points of its own target by a millimetre, as the flange is turned
+    /// there.
     #[test]
     fn places_of_targets_that_the_robot_joined_move_their_own_points() {
         let world = synthetic::planned(40, 0, 25.0, 0.0, 3, &|_| {});

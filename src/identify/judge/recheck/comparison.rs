@@ -122,7 +122,8 @@ impl Comparison<'_> {
         others.map(|(_, suspect, off)| (suspect.word.clone(), suspect.by(&off.amounts))).collect()
     }
 
-    /// Each placement against where it stood: moved where it did whichever of the causes it was. Of a change that nothing explains they tell nothing.
+    /// Each placement against where it stood: moved where it did whichever of the causes it was. Of a change that
+    /// nothing explains they tell nothing.
     fn placements<'a>(&self, compared: &Compared, changed: bool, causes: impl Iterator<Item = &'a Off>) -> Vec<Moved> {
         let placed = |off: &Off| placements(self.set, compared, off, self.stood);
         if !changed {

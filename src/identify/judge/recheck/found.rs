@@ -94,24 +94,26 @@ pub struct Recheck {
     pub seen_mm: f64,
     /// The largest movement of the target by a single cause that the poses leave room for, mm.
     pub at_most_mm: f64,
-    /// What of the robot explains placements that seem to have moved, had none: words for files and for people. A robot that stands nearly still shows
-    /// a turned joint as a sensor that moved.
+    /// What of the robot explains placements that seem to have moved, had none: words for files and for people. A robot
+    /// that stands nearly still shows a turned joint as a sensor that moved.
     pub instead: Vec<(String, String)>,
-    /// The largest movement of the target by a single cause over all that the robot was identified in which the poses leave room for, mm.
+    /// The largest movement of the target by a single cause over all that the robot was identified in which the poses
+    /// leave room for, mm.
     pub elsewhere_mm: f64,
     /// What matters, mm: the robot's own errors, where nothing else is said.
     pub tolerance_mm: f64,
     /// Whether the points are those of cameras, or another instrument's.
     pub by_cameras: bool,
-    /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what was identified, as much may be off.
+    /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what
+    /// was identified, as much may be off.
     pub correction_mm: f64,
     /// The joints whose ranges many rows are outside of, where a change is no more than that.
     pub extrapolated: Vec<String>,
 }
 
 impl Before {
-    /// The same where these joints stand outside of what was identified. Links hold everywhere; a term that follows an angle was seen over a range, and
-    /// says of places beyond it no more than that there is something of its size.
+    /// The same where these joints stand outside of what was identified. Links hold everywhere; a term that follows an
+    /// angle was seen over a range, and says of places beyond it no more than that there is something of its size.
     #[must_use]
     pub fn outside(&self, joints: &[usize]) -> Before {
         let mut beyond = self.clone();
@@ -162,7 +164,8 @@ impl Recheck {
         self.scatters() || self.cause().is_empty()
     }
 
-    /// The largest movement of the target by a single cause that is not ruled out, at these poses and wherever the robot was identified, mm.
+    /// The largest movement of the target by a single cause that is not ruled out, at these poses and wherever the
+    /// robot was identified, mm.
     pub fn room_mm(&self) -> f64 {
         self.at_most_mm.max(self.elsewhere_mm)
     }
@@ -223,7 +226,8 @@ impl Recheck {
         if self.by_cameras { "the cameras stand" } else { "the instrument stands" }
     }
 
-    /// Whether the poses rule out that the robot changed: in place of the sensor that moved, and beside it by as much as matters.
+    /// Whether the poses rule out that the robot changed: in place of the sensor that moved, and beside it by as much
+    /// as matters.
     pub fn is_same(&self) -> bool {
         !self.changed && self.instead.is_empty() && self.room_mm() <= self.tolerance_mm
     }

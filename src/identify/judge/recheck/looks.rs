@@ -1,7 +1,8 @@
-//! All looks at the residuals of an old robot: whether something changed, what explains it, and what would have been seen.
+//! All looks at the residuals of an old robot: whether something changed, what explains it, and what would have been
+//! seen.
 //!
-//! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and those that explain a change.
-//! Goes wrong: causes with the same columns are not told apart, and named together.
+//! In: the residuals with their covariance, and the columns of what may have changed. Out: each cause by itself, and
+//! those that explain a change. Goes wrong: causes with the same columns are not told apart, and named together.
 
 use nalgebra::DVector;
 
@@ -15,7 +16,8 @@ use crate::tables::names::Unit;
 /// White size of a cause, a mrad or mm, below which the poses see nothing of it.
 const UNSEEN: f64 = 1e-4;
 
-/// A turn that must be larger than this to be seen, rad, is not seen either: up to here a turn moves points along its column to half a hundredth.
+/// A turn that must be larger than this to be seen, rad, is not seen either: up to here a turn moves points along its
+/// column to half a hundredth.
 const LINEAR_RAD: f64 = 0.1;
 
 /// Chance that a cause is larger than it is said to be at the most.
@@ -79,8 +81,8 @@ impl<'a> Looks<'a> {
         }
     }
 
-    /// By how much a cause may move the target over these poses, if it alone changed: with a chance of nineteen in twenty, mm. Of a turn the poses leave
-    /// no more than what would show.
+    /// By how much a cause may move the target over these poses, if it alone changed: with a chance of nineteen in
+    /// twenty, mm. Of a turn the poses leave no more than what would show.
     pub(super) fn room_mm(&self, suspect: &Suspect, over: &Moves) -> f64 {
         let difference = &self.look.difference;
         let [direction] = &self.look.directions(suspect)[..] else { return 0.0 };
@@ -102,7 +104,8 @@ impl<'a> Looks<'a> {
         difference.chi_square() > difference.limit(difference.off.len(), chance) || self.suspects.iter().any(over)
     }
 
-    /// Suspects that leave no more than chance and are not told apart, the likeliest first, with the logarithm of their likelihood and their numbers.
+    /// Suspects that leave no more than chance and are not told apart, the likeliest first, with the logarithm of their
+    /// likelihood and their numbers.
     pub(super) fn explained(&self) -> Vec<(f64, &'a Suspect, Off)> {
         let count = self.look.difference.off.len();
         let mut explain: Vec<(f64, &'a Suspect, Off)> = Vec::new();

@@ -1,4 +1,5 @@
-//! How far a change of the robot moves the target, in the base and once the placements were found anew; and each placement against where it stood.
+//! How far a change of the robot moves the target, in the base and once the placements were found anew; and each
+//! placement against where it stood.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -58,7 +59,8 @@ impl Moves {
     }
 }
 
-/// How far the offsets of a robot, and behind them a thousandth of scale, move the target at these places, mm: once placed anew, and in the base.
+/// How far the offsets of a robot, and behind them a thousandth of scale, move the target at these places, mm: once
+/// placed anew, and in the base.
 fn of_places(places: &[&Place], robot: usize) -> (DMatrix<f64>, DMatrix<f64>) {
     let mut columns = DMatrix::zeros(3 * places.len(), robot + 1);
     let mut rigid = DMatrix::zeros(3 * places.len(), 6);
@@ -136,7 +138,8 @@ pub(super) fn placements(set: &Dataset, compared: &Compared, off: &Off, stood: S
     list
 }
 
-/// Covariance of a frame, the target's turn found with it, and what is uncertain of the old robot and of its change in it.
+/// Covariance of a frame, the target's turn found with it, and what is uncertain of the old robot and of its change in
+/// it.
 fn of_frame(placement: &Placement, count: usize, before: &Before, off: &Off) -> DMatrix<f64> {
     let Linear { jacobian, design, .. } = &*placement.linear;
     let turns = jacobian.ncols() - count;

@@ -1,9 +1,10 @@
 //! Readings that scatter more than at the identification: an instrument that is noisier, rounded joint angles, play.
 //!
-//! In: rows that contradict the old robot, and that nothing single explains. Out: what they say where all of it may be scatter, which then is their
-//! cause. Method: what no zero of a joint, no tool and no scale together explain tells the scatter; where neither all of these together nor any of
-//! them shows beyond it (F tests), nothing but scatter is told. All figures are then those of the larger scatter. Goes wrong: what follows the pose
-//! in another way than those (a load, play) is scatter too, unless it looks like one of them.
+//! In: rows that contradict the old robot, and that nothing single explains. Out: what they say where all of it may be
+//! scatter, which then is their cause. Method: what no zero of a joint, no tool and no scale together explain tells the
+//! scatter; where neither all of these together nor any of them shows beyond it (F tests), nothing but scatter is told.
+//! All figures are then those of the larger scatter. Goes wrong: what follows the pose in another way than those (a
+//! load, play) is scatter too, unless it looks like one of them.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -46,8 +47,8 @@ pub(super) fn larger(comparison: &Comparison, used: &[usize], whole: &Said) -> O
     (!said.changed).then_some(Recheck { changed: true, likeliest, effect_mm: whole.recheck.effect_mm, ..said })
 }
 
-/// How many times as far as they are known to the residuals scatter beside all changes, and the degrees of freedom that tell; `None` where they do
-/// not scatter more, or a change shows beyond it.
+/// How many times as far as they are known to the residuals scatter beside all changes, and the degrees of freedom that
+/// tell; `None` where they do not scatter more, or a change shows beyond it.
 fn beyond_changes(comparison: &Comparison, used: &[usize]) -> Option<(f64, f64)> {
     let look = comparison.look(used)?;
     let suspects = suspects(comparison.robot, &comparison.parameters);

@@ -1,9 +1,9 @@
 //! Rows that fit far worse than the rest: a reading that was misread, joints of another row.
 //!
-//! In: rows that contradict the old robot, and what they say together. Out: what the others say without the strays, and who these are. Method: the
-//! rows whose absence leaves least, one after the other, each by more than chance, until what is left agrees with the old robot or is explained by
-//! one cause. A single cause that explains all rows is believed before a stray is, unless the stray is much likelier. Goes wrong: two causes at
-//! once that few rows see.
+//! In: rows that contradict the old robot, and what they say together. Out: what the others say without the strays, and
+//! who these are. Method: the rows whose absence leaves least, one after the other, each by more than chance, until
+//! what is left agrees with the old robot or is explained by one cause. A single cause that explains all rows is
+//! believed before a stray is, unless the stray is much likelier. Goes wrong: two causes at once that few rows see.
 
 use super::comparison::{Comparison, Said};
 use super::found::{FALSE_ALARM, Recheck};
@@ -70,7 +70,8 @@ fn only_strays(comparison: &Comparison, mut rest: Vec<usize>, mut strays: Vec<us
     Recheck { strays: comparison.set.names(&strays), ..recheck }
 }
 
-/// The row whose absence leaves the least squared residuals, and how much. Of many rows, those that do so where all is linear are looked at alone.
+/// The row whose absence leaves the least squared residuals, and how much. Of many rows, those that do so where all is
+/// linear are looked at alone.
 fn farthest(comparison: &Comparison, rows: &[usize]) -> Option<(f64, usize)> {
     let group = |row: usize| comparison.set.poses[row].group;
     let is_spare = |row: &usize| rows.iter().filter(|&&other| group(other) == group(*row)).count() > FEWEST_POSES;

@@ -1,10 +1,11 @@
-//! What may have changed on a robot, as columns of the offsets of its parameters; and how much more than in other directions readings scatter along
-//! it.
+//! What may have changed on a robot, as columns of the offsets of its parameters; and how much more than in other
+//! directions readings scatter along it.
 //!
-//! In: the fit by which a robot was identified. Out: for each cause that is looked for later, the variance of the residuals along it over what
-//! scatter alike in all directions would leave of them there. What a model lacks comes through the joints, and is larger where their levers are
-//! long: a mean over poses of what the residuals of each say along the cause ("sandwich": White, Econometrica 48, 1980), against what the fit
-//! left of them. Goes wrong: few poses, which tell it to a quarter or so; less than alike is taken for chance.
+//! In: the fit by which a robot was identified. Out: for each cause that is looked for later, the variance of the
+//! residuals along it over what scatter alike in all directions would leave of them there. What a model lacks comes
+//! through the joints, and is larger where their levers are long: a mean over poses of what the residuals of each say
+//! along the cause ("sandwich": White, Econometrica 48, 1980), against what the fit left of them. Goes wrong: few
+//! poses, which tell it to a quarter or so; less than alike is taken for chance.
 
 use nalgebra::DMatrix;
 

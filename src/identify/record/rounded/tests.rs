@@ -27,7 +27,8 @@ fn points_computed_from_joints_are_known_by_their_digits() {
         let told = said(&shown(0.0, seed, steps)).unwrap_or_else(|| panic!("{steps:?}"));
         assert!(told.contains("were computed, by the robot's controller") && told.contains("not measured"), "{told}");
     }
-    // Of so coarse points nobody knows whether more was measured than they show; of so coarse angles it is said of them alone.
+    // Of so coarse points nobody knows whether more was measured than they show; of so coarse angles it is said of them
+    // alone.
     let told = said(&shown(0.0, 6, [0.01, 0.5])).unwrap();
     assert!(told.contains("were computed, or have too few digits"), "{told}");
     assert_eq!(said(&shown(0.0, 6, [0.1, 0.1])), None);

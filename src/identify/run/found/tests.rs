@@ -127,7 +127,8 @@ fn stated_uncertainties_are_those_of_simulated_robots() {
     for oriented in [false, true] {
         let Tally { sensor, target, coordinates, scatter } = tally(8, 60, oriented, Extensions::None);
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-        // Four placements of eight robots, and what they have in common: three standard deviations of a chi-squared over its degrees of freedom.
+        // Four placements of eight robots, and what they have in common: three standard deviations of a chi-squared
+        // over its degrees of freedom.
         assert!((0.7..1.4).contains(&mean(&sensor)), "{oriented}: placements {}", mean(&sensor));
         assert!((0.6..1.5).contains(&mean(&target)), "{oriented}: target {}", mean(&target));
         let share = coordinates.1 as f64 / coordinates.0 as f64;
@@ -145,7 +146,8 @@ fn what_is_held_is_what_a_placement_stands_for() {
     let found = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
     let placed = found.placed(&set, &world.nominal, &settings).unwrap().unwrap();
     for parameter in world.nominal.mdh_parameters() {
-        // Of what moves the target on the flange the last joint takes the share that its tolerance has beside the target's.
+        // Of what moves the target on the flange the last joint takes the share that its tolerance has beside the
+        // target's.
         let held = is_held(parameter, usize::MAX);
         let off = (placed.robot.value(parameter) - world.nominal.value(parameter)).abs();
         assert!(!held || off < 1e-9, "{} moved by {off}", parameter.name());
@@ -184,7 +186,8 @@ fn stated(world: &mut World, scale: f64) {
     }
 }
 
-/// Where noise is stated cameras have an unknown scale: what is uncertain of it is uncertain of the robot, and not of what they read.
+/// Where noise is stated cameras have an unknown scale: what is uncertain of it is uncertain of the robot, and not of
+/// what they read.
 #[test]
 fn a_rigs_own_scale_is_not_expected_in_what_it_reads() {
     let settings = Settings { extensions: Extensions::None, ..synthetic::settings() };

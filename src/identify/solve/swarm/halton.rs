@@ -1,8 +1,8 @@
 //! Halton's low-discrepancy sequence, with a permuted digit order where the bases grow large.
 //!
 //! Plain Halton points in more than about ten dimensions lie on lines (Fig. 3 of the paper shows two dimensions, where
-//! they don't); Braaten and Weller (1979) permute the digits. Here each base's digits are permuted from the seed, zero staying
-//! zero; bases 2 and 3 keep theirs.
+//! they don't); Braaten and Weller (1979) permute the digits. Here each base's digits are permuted from the seed, zero
+//! staying zero; bases 2 and 3 keep theirs.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;

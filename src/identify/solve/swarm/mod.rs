@@ -61,7 +61,8 @@ mod tests {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// How surely it does so, from other starts and with other constants, `cargo bench --bench identify -- constants` counts.
+    /// How surely it does so, from other starts and with other constants, `cargo bench --bench identify -- constants`
+    /// counts.
     #[test]
     #[ignore = "slow"]
     fn stapso_ends_at_the_best_of_many_starts_and_below_the_other_swarms() {

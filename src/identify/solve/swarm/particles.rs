@@ -1,9 +1,9 @@
 //! Particle swarms: PSO of eq. (14) and its relatives CPSO, APSO and ARPSO; the paper's STAPSO is built on them.
 //!
 //! In: a problem in a box, constants, a seed. Out: the best point with its history. Random numbers are drawn by one
-//! generator in a fixed order and costs are summed in a fixed order, so that any number of threads gives the same bytes.
-//! Eq. (14) draws one number a dimension for the particle's own best and one number a particle for the swarm's best.
-//! What goes wrong: eq. (14) has no inertia, so velocities are limited; a particle that meets a wall stops there.
+//! generator in a fixed order and costs are summed in a fixed order, so that any number of threads gives the same
+//! bytes. Eq. (14) draws one number a dimension for the particle's own best and one number a particle for the swarm's
+//! best. What goes wrong: eq. (14) has no inertia, so velocities are limited; a particle that meets a wall stops there.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

@@ -5,8 +5,8 @@
 //! 3. On stagnation each particle has three candidates: X' of eq. (15) (the swarm's move), X'' of eq. (16) (trust-region
 //!    iterations from where it is), X''' of eq. (17) and (19) (sine-cosine); eq. (18) keeps the one of least cost.
 //!
-//! The paper's eq. (18) writes X'' twice; (16) is X'', (17) is X'''. It leaves S, beta and the trust region's share open:
-//! see [`StapsoSettings`](crate::identify::settings::StapsoSettings).
+//! The paper's eq. (18) writes X'' twice; (16) is X'', (17) is X'''. It leaves S, beta and the trust region's share
+//! open: see [`StapsoSettings`](crate::identify::settings::StapsoSettings).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;

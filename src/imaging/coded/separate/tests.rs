@@ -1,4 +1,5 @@
-//! Grids of separate tags, rendered: every corner has its own number and lies where it should as surely as it says; other grids are named.
+//! Grids of separate tags, rendered: every corner has its own number and lies where it should as surely as it says;
+//! other grids are named.
 
 use nalgebra::Point2;
 

@@ -1,7 +1,7 @@
 //! One line of `corners.csv`.
 //!
-//! In: the fields of a line and where its columns stand. Out: the corner with its pair, side and picture's size. Goes wrong: words where numbers
-//! should stand, a place and a number that are not of one corner; the error names the line.
+//! In: the fields of a line and where its columns stand. Out: the corner with its pair, side and picture's size. Goes
+//! wrong: words where numbers should stand, a place and a number that are not of one corner; the error names the line.
 
 use nalgebra::{Matrix2, Point2};
 

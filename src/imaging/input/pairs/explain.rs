@@ -110,7 +110,8 @@ fn found(holding: &[&Folder]) -> String {
     text
 }
 
-/// Several readings are as good. `is_read_alone` says whether the folders of one, when they are named, are read in the same way.
+/// Several readings are as good. `is_read_alone` says whether the folders of one, when they are named, are read in the
+/// same way.
 pub fn several(source: &Source<'_>, readings: &[Reading], is_read_alone: impl Fn(&Reading) -> bool) -> Error {
     let flags = source.by.map_or_else(String::new, |by| format!("--pair-by {}", by.word()));
     let mut statement = format!("these pictures can be read in {} ways", readings.len());

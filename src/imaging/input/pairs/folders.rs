@@ -1,4 +1,5 @@
-//! Pairs of whole pictures in folders: a folder for each side that was named, `left/` and `right/`, or the one reading of all that is there.
+//! Pairs of whole pictures in folders: a folder for each side that was named, `left/` and `right/`, or the one reading
+//! of all that is there.
 
 use super::explain;
 use super::listing::{Folder, list, tree};

@@ -1,7 +1,8 @@
 //! The pairs of a source: whole pictures, or pictures that hold both views, beside or above each other, cut into two.
 //!
-//! In: folders of whole pictures, or pictures of even width or height. Out: pairs of pictures of half of it in the pictures' own depth and colours, PNG, among the program's
-//! own files in the results folder. Goes wrong: an odd width or height. A picture that cannot be decoded stays as it is, and its reader says why.
+//! In: folders of whole pictures, or pictures of even width or height. Out: pairs of pictures of half of it in the
+//! pictures' own depth and colours, PNG, among the program's own files in the results folder. Goes wrong: an odd width
+//! or height. A picture that cannot be decoded stays as it is, and its reader says why.
 
 use camino::{Utf8Path, Utf8PathBuf};
 use rayon::prelude::*;
@@ -17,8 +18,8 @@ use crate::imaging::image::{self, Claim};
 use crate::imaging::{Error, Result, Side};
 
 impl Source<'_> {
-    /// Finds the pairs. At least one, else an error that says what was there. Halves of pictures are written among the program's own
-    /// files in `out`.
+    /// Finds the pairs. At least one, else an error that says what was there. Halves of pictures are written among the
+    /// program's own files in `out`.
     pub fn pairs(&self, out: &OutDir) -> Result<Pairing> {
         self.halves.map_or_else(|| self.whole_pictures(), |halves| split(self, halves, out))
     }

@@ -5,8 +5,8 @@
 use super::tests::{expanded, folder, outcome};
 use super::{PairBy, Pairing};
 
-/// Three lines each: repository and folder; the files; what comes of it, as [`told`] says it or, of a refusal, words of it, two blanks apart. The last
-/// folder is refused with a hint that names `--pair-by order`, which makes pairs of it.
+/// Three lines each: repository and folder; the files; what comes of it, as [`told`] says it or, of a refusal, words of
+/// it, two blanks apart. The last folder is refused with a hint that names `--pair-by order`, which makes pairs of it.
 const LAYOUTS: &str = "\
 # Two folders called left and right.
 thiyagu1/Handy_Calib_Images: .

@@ -1,7 +1,7 @@
 //! What lies in a folder: pictures, other files, and the folders below that hold pictures.
 //!
-//! Hidden files and folders are passed over, and so are folders that this program wrote its results into: a run inside the folder of
-//! pictures must not find what it wrote the last time.
+//! Hidden files and folders are passed over, and so are folders that this program wrote its results into: a run inside
+//! the folder of pictures must not find what it wrote the last time.
 
 use camino::{Utf8Path, Utf8PathBuf};
 
@@ -10,8 +10,8 @@ use crate::files::provenance::picture_format;
 use crate::files::{self, OutDir};
 use crate::imaging::{Error, Result};
 
-/// Levels below a folder, and folders there, that are looked into: enough for any set of pictures, and an end where the folder that was
-/// named is a whole disk.
+/// Levels below a folder, and folders there, that are looked into: enough for any set of pictures, and an end where the
+/// folder that was named is a whole disk.
 const DEEPEST: usize = 5;
 const MOST_FOLDERS: usize = 2000;
 
@@ -92,7 +92,8 @@ fn once(pictures: &mut Vec<Utf8PathBuf>) -> usize {
     before - pictures.len()
 }
 
-/// The folder itself, then the folders below it that hold pictures, level by level in natural order. One that can't be read is none.
+/// The folder itself, then the folders below it that hold pictures, level by level in natural order. One that can't be
+/// read is none.
 pub fn tree(root: Folder) -> Vec<Folder> {
     let top = root.path.clone();
     let mut all = Vec::new();

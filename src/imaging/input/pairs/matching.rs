@@ -1,8 +1,9 @@
-//! From the pictures of two sides to pairs: by equal names, by what is left without the word for the side, by number, or in their order.
+//! From the pictures of two sides to pairs: by equal names, by what is left without the word for the side, by number,
+//! or in their order.
 //!
-//! Out: pairs in natural order of their names, each with a name of its own, and the pictures without a partner. The first way that pairs
-//! most of the smaller side is taken, else the one that pairs most; what it leaves over may have another naming that pairs it. Goes wrong:
-//! two pictures of a side that would be the same one of a pair.
+//! Out: pairs in natural order of their names, each with a name of its own, and the pictures without a partner. The
+//! first way that pairs most of the smaller side is taken, else the one that pairs most; what it leaves over may have
+//! another naming that pairs it. Goes wrong: two pictures of a side that would be the same one of a pair.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -36,7 +37,8 @@ enum Way {
     NumbersOfForm,
     /// The numbers that are not the same throughout a side.
     VaryingNumbers,
-    /// The last number of each name: taken only where it pairs most of a side, for the seconds of a time agree by chance.
+    /// The last number of each name: taken only where it pairs most of a side, for the seconds of a time agree by
+    /// chance.
     LastNumber,
 }
 
@@ -73,7 +75,8 @@ impl Way {
     }
 }
 
-/// Pairs left pictures with right ones. No pair at all is no error here, two pictures for one place are, where nothing else pairs them.
+/// Pairs left pictures with right ones. No pair at all is no error here, two pictures for one place are, where nothing
+/// else pairs them.
 pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> Result<Matched> {
     if by == Some(PairBy::Order) {
         return Ok(in_order([left, right]));
@@ -190,7 +193,8 @@ fn written(stem: &str, plain_numbers: &str) -> Option<String> {
     Some(found.join("_"))
 }
 
-/// The numbers that are not the same in names that are alike but for their numbers and words for a side, and what these names have in common.
+/// The numbers that are not the same in names that are alike but for their numbers and words for a side, and what these
+/// names have in common.
 fn numbers_of_form(stems: &[&str]) -> Vec<Option<String>> {
     let form = |stem: &str| {
         let open = Open::new(stem, Reach::Words).key;

@@ -1,8 +1,9 @@
 //! Words for a side in the names of files and folders, numbers in them, and their natural order.
 //!
-//! In: a name. Out: the name with each word for a side left open, and which side each word tells; its numbers. A word counts by what it
-//! stands against: two names are a left and a right one where they differ in such words only, each time left against right, so that
-//! `right_angle_left_1` is the left one beside `right_angle_right_1`. Goes wrong: two words of one name that tell different sides.
+//! In: a name. Out: the name with each word for a side left open, and which side each word tells; its numbers. A word
+//! counts by what it stands against: two names are a left and a right one where they differ in such words only, each
+//! time left against right, so that `right_angle_left_1` is the left one beside `right_angle_right_1`. Goes wrong: two
+//! words of one name that tell different sides.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -106,7 +107,8 @@ impl Open {
         both.map(|((word, mine, _), _)| (word, *mine))
     }
 
-    /// The side of this name beside another of the same key: they differ in words for a side only, each time the same way round.
+    /// The side of this name beside another of the same key: they differ in words for a side only, each time the same
+    /// way round.
     pub fn side_beside(&self, other: &Open) -> Option<Side> {
         let mut differing = self.differing(other);
         let (_, first) = differing.next()?;
@@ -154,7 +156,8 @@ fn runs(name: &str, kind: impl Fn(char) -> bool) -> Vec<Range<usize>> {
     runs
 }
 
-/// A run of letters cut where the case changes: `lData` into `l` and `Data`, `LData` into `L` and `Data`, `imgL` into `img` and `L`.
+/// A run of letters cut where the case changes: `lData` into `l` and `Data`, `LData` into `L` and `Data`, `imgL` into
+/// `img` and `L`.
 fn pieces(name: &str, run: Range<usize>) -> Vec<Range<usize>> {
     let letters: Vec<(usize, char)> = name[run.clone()].char_indices().collect();
     let mut cuts = vec![run.start];
@@ -170,7 +173,8 @@ fn pieces(name: &str, run: Range<usize>) -> Vec<Range<usize>> {
     cuts.windows(2).map(|w| w[0]..w[1]).collect()
 }
 
-/// The first long word of a run. It stands alone where it is a piece of the run, or where the run has no case that could cut it.
+/// The first long word of a run. It stands alone where it is a piece of the run, or where the run has no case that
+/// could cut it.
 fn long_word(name: &str, run: Range<usize>, pieces: &[Range<usize>]) -> Option<Found> {
     // Where small letters are longer than the capitals, places in one are not places in the other.
     let lower = Some(name[run.clone()].to_lowercase()).filter(|lower| lower.len() == run.len())?;

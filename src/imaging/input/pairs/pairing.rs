@@ -25,7 +25,8 @@ impl PairBy {
 /// The two picture files of a pair.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PairFiles {
-    /// Name of the pair: the pictures' common stem, what is left of both without the word for the side, or their number.
+    /// Name of the pair: the pictures' common stem, what is left of both without the word for the side, or their
+    /// number.
     pub pair: String,
     pub left: Utf8PathBuf,
     pub right: Utf8PathBuf,

@@ -1,9 +1,10 @@
 //! Ways to read what lies in a folder as pictures of two cameras.
 //!
-//! In: the folders that hold pictures. Out: every reading with at least one pair: two folders, one folder whose names say the side, or a folder
-//! for each pair, with what told left from right. Words tell most, then letters, then two names that differ in one number or letter, then nothing but that
-//! there are two. [`choose`] takes the best of them, or says that several are as good: a few stray pairs, or results that lie beside the
-//! pictures that they were made of, are no rivals.
+//! In: the folders that hold pictures. Out: every reading with at least one pair: two folders, one folder whose names
+//! say the side, or a folder for each pair, with what told left from right. Words tell most, then letters, then two
+//! names that differ in one number or letter, then nothing but that there are two. [`choose`] takes the best of them,
+//! or says that several are as good: a few stray pairs, or results that lie beside the pictures that they were made of,
+//! are no rivals.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +19,8 @@ use crate::imaging::{Result, Side};
 /// Folders that are compared with each other: among more, no two are the cameras' without being named.
 const MOST_COMPARED: usize = 32;
 
-/// Folders of two pictures each from which on they are those of pairs: nobody has so many cameras and two pictures of each.
+/// Folders of two pictures each from which on they are those of pairs: nobody has so many cameras and two pictures of
+/// each.
 const PAIRS_AT_LEAST: usize = 5;
 
 /// Words by which a folder says that its pictures were made of others.
@@ -77,15 +79,17 @@ impl Reading {
         self.matched.pairs.len()
     }
 
-    /// Whether these are some pairs beside another reading: too few, where that one has enough and its names tell the sides, or tell as much. What
-    /// is then left out lies in a folder of its own; the same pictures read in another way stay a rival.
+    /// Whether these are some pairs beside another reading: too few, where that one has enough and its names tell the
+    /// sides, or tell as much. What is then left out lies in a folder of its own; the same pictures read in another way
+    /// stay a rival.
     fn is_stray_beside(&self, other: &Reading, needed: usize) -> bool {
         let apart = self.places.iter().any(|place| !other.places.contains(place));
         let told = other.told <= self.told.max(Told::Letters);
         self.count() < needed && other.count() >= needed && told && apart
     }
 
-    /// Whether these are names of a folder that holds `left/` and `right/` as well, with no fewer pairs: those are what is read of it.
+    /// Whether these are names of a folder that holds `left/` and `right/` as well, with no fewer pairs: those are what
+    /// is read of it.
     fn is_beside_sides(&self, other: &Reading) -> bool {
         let ([folder], [left, right]) = (self.places.as_slice(), other.places.as_slice()) else { return false };
         let is = |side: &Utf8Path, word: &str| {
@@ -140,7 +144,8 @@ pub fn all(folders: &[Folder], by: Option<PairBy>) -> Vec<Result<Reading>> {
     readings
 }
 
-/// A folder for each pair: two pictures in each of them, called alike in all and by words for the side; of many also by two numbers or letters.
+/// A folder for each pair: two pictures in each of them, called alike in all and by words for the side; of many also by
+/// two numbers or letters.
 fn by_folders(below: &[&Folder]) -> Option<Reading> {
     let (first, rest) = below.split_first().filter(|(_, rest)| !rest.is_empty())?;
     let names = |folder: &Folder| -> Option<[String; 2]> {
@@ -175,7 +180,8 @@ fn by_folders(below: &[&Folder]) -> Option<Reading> {
     })
 }
 
-/// What tells the sides of two folders, and the side of the first; `None` where they are not the two sides of something.
+/// What tells the sides of two folders, and the side of the first; `None` where they are not the two sides of
+/// something.
 fn tell(first: &Folder, second: &Folder, alone: bool) -> Option<(Told, Side)> {
     for (reach, told) in BY_NAMES {
         let open = |folder: &Folder| Open::new(&folder.below, reach);
@@ -224,8 +230,8 @@ fn common_side(folder: &Folder) -> Option<Side> {
     sides.all(|side| side == Some(first)).then_some(first)
 }
 
-/// The readings of one folder by its names: words for the side where there are some, else each place at which all names have one of two
-/// numbers or words.
+/// The readings of one folder by its names: words for the side where there are some, else each place at which all names
+/// have one of two numbers or words.
 fn by_names(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
     for (reach, told) in BY_NAMES {
         let sides = told_by_names(folder, reach);
@@ -266,7 +272,8 @@ fn told_by_names(folder: &Folder, reach: Reach) -> [Vec<Utf8PathBuf>; 2] {
     sides
 }
 
-/// Readings of names that have one of two numbers or words at some place, each with the same rest: `camera0_1.png` and `camera1_1.png`.
+/// Readings of names that have one of two numbers or words at some place, each with the same rest: `camera0_1.png` and
+/// `camera1_1.png`.
 ///
 /// Two pairs at least, and most of the folder's pictures in pairs: any two names differ somewhere.
 fn by_two_values(folder: &Folder, by: Option<PairBy>) -> Vec<Result<Reading>> {
@@ -303,7 +310,8 @@ fn without(tokens: &[&str], place: usize) -> String {
     before + if met { after.trim_start_matches(SEPARATORS) } else { &after }
 }
 
-/// The best reading, or all that are as good: none of them is to be preferred without being told. `needed` is how many pairs are of use.
+/// The best reading, or all that are as good: none of them is to be preferred without being told. `needed` is how many
+/// pairs are of use.
 pub fn choose(mut readings: Vec<Reading>, needed: usize) -> Vec<Reading> {
     readings.retain(|reading| reading.count() > 0);
     let all = readings.clone();

@@ -5,7 +5,8 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::{PairBy, Pairing, Source};
 use crate::files::temporary_folder;
 
-/// All names that patterns stand for: `{1,2}` for each of a list, `{1..9}` for each number of a range, `␣` for a blank. Patterns are a blank apart.
+/// All names that patterns stand for: `{1,2}` for each of a list, `{1..9}` for each number of a range, `␣` for a blank.
+/// Patterns are a blank apart.
 pub fn expanded(patterns: &str) -> Vec<String> {
     patterns.split(' ').flat_map(|pattern| names_of(&pattern.replace('␣', " "))).collect()
 }

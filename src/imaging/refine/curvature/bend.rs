@@ -14,13 +14,14 @@ pub struct Bend {
 }
 
 impl Bend {
-    /// Variance of a corner across its line, measured in a window whose straight edge is off by `by_bend` px^2 times the bend, px^2; `known_px2` is what it
-    /// is where the bend is known. The corner itself shows the bend.
+    /// Variance of a corner across its line, measured in a window whose straight edge is off by `by_bend` px^2 times
+    /// the bend, px^2; `known_px2` is what it is where the bend is known. The corner itself shows the bend.
     pub fn variance_px2(&self, by_bend: f64, known_px2: f64) -> f64 {
         known_px2 * (1.0 + 2.0 * by_bend * self.by_own) + by_bend * by_bend * self.variance
     }
 
-    /// How much of what moves the corner in such a window across its line does so still where the line's bend, which it takes part in, is the edge's.
+    /// How much of what moves the corner in such a window across its line does so still where the line's bend, which it
+    /// takes part in, is the edge's.
     pub fn own_share(&self, by_bend: f64) -> f64 {
         1.0 + by_bend * self.by_own
     }

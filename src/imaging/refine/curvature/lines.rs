@@ -1,4 +1,5 @@
-//! The bends of all lines of a board, both ways: of whole boards line by line, by the offsets of its corners from its chord.
+//! The bends of all lines of a board, both ways: of whole boards line by line, by the offsets of its corners from its
+//! chord.
 
 use nalgebra::{DMatrix, DVector, Point2, Vector2};
 
@@ -7,8 +8,8 @@ use super::parallel::{self, Line};
 use crate::imaging::lattice::Lattice;
 use crate::statistics::median;
 
-/// Bends of the two edges at each place of the grid; `None` on lines with fewer than three corners that count. A place that is off its line by many
-/// times what is usual there and by more than they are good for does not count.
+/// Bends of the two edges at each place of the grid; `None` on lines with fewer than three corners that count. A place
+/// that is off its line by many times what is usual there and by more than they are good for does not count.
 pub fn bends(grid: &Lattice<Point>, rule: Rule) -> Vec<[Option<Bend>; 2]> {
     let mut bends = vec![[None; 2]; grid.columns * grid.rows];
     let at = |c: usize, r: usize| Some((r * grid.columns + c, *grid.get(c, r)?));
@@ -26,8 +27,8 @@ pub fn bends(grid: &Lattice<Point>, rule: Rule) -> Vec<[Option<Bend>; 2]> {
     bends
 }
 
-/// Sets the bend of a line at each of its corners, where it shows any. Corners that are off by many times what is usual and by more than `good_px` do not
-/// count.
+/// Sets the bend of a line at each of its corners, where it shows any. Corners that are off by many times what is usual
+/// and by more than `good_px` do not count.
 fn line_bend(line: &[(usize, Point)], good_px: f64, mut set: impl FnMut(usize, Bend)) {
     let ([(_, first), .., (_, last)], FEWEST..) = (line, line.len()) else { return };
     let (first, last) = (first.px, last.px);
@@ -64,8 +65,8 @@ fn line_bend(line: &[(usize, Point)], good_px: f64, mut set: impl FnMut(usize, B
     }
 }
 
-/// The polynomial through points `(number, place, offset)`, without those that lie far off: a corner that is hidden in part must
-/// not bend the line of the others.
+/// The polynomial through points `(number, place, offset)`, without those that lie far off: a corner that is hidden in
+/// part must not bend the line of the others.
 fn through(mut points: Vec<(usize, f64, f64)>, degree: usize, good_px: f64) -> Option<DVector<f64>> {
     /// A point is off by this many times the usual misfit at the least.
     const FAR: f64 = 8.0;

@@ -1,11 +1,12 @@
 //! How a board's lines bend that is seen in part: all lines of one direction together.
 //!
-//! In: the lines of one direction, their corners with covariances. Out: the bend at each corner. Method: a lens bends neighbouring lines alike. The offsets of
-//! a line's corners from a straight one, which is its own, are a polynomial of the place along it whose coefficients are polynomials of the line's place
-//! across (degree 2 to 5 in both together, by how many corners there are), by weighted least squares: corners that the border cuts are known
-//! worse than others, and lines of few corners show their bends at their ends badly. Of fewer terms than the corners tell a lens's fifth-order
-//! distortion leaves 0.015 px at the ends of lines of six squares that fill a picture of 800 px.
-//! Goes wrong: fewer than three corners on every line, which only the windows themselves show to bend.
+//! In: the lines of one direction, their corners with covariances. Out: the bend at each corner. Method: a lens bends
+//! neighbouring lines alike. The offsets of a line's corners from a straight one, which is its own, are a polynomial of
+//! the place along it whose coefficients are polynomials of the line's place across (degree 2 to 5 in both together, by
+//! how many corners there are), by weighted least squares: corners that the border cuts are known worse than others,
+//! and lines of few corners show their bends at their ends badly. Of fewer terms than the corners tell a lens's
+//! fifth-order distortion leaves 0.015 px at the ends of lines of six squares that fill a picture of 800 px. Goes
+//! wrong: fewer than three corners on every line, which only the windows themselves show to bend.
 
 use nalgebra::{DMatrix, DVector, Point2, Unit, Vector2};
 
@@ -86,8 +87,8 @@ struct Counting {
     variance_px2: f64,
 }
 
-/// Sets the bend of the lines at each of their corners, where they show any. Corners that are off by many times what is usual and by more than
-/// `good_px` do not count.
+/// Sets the bend of the lines at each of their corners, where they show any. Corners that are off by many times what is
+/// usual and by more than `good_px` do not count.
 pub(super) fn bends(lines: &[Line], good_px: f64, mut set: impl FnMut(usize, Bend)) {
     let Some(frame) = Frame::of(lines) else { return };
     let counting = lines.iter().zip(&frame.chords).enumerate().flat_map(|(number, (line, chord))| {
@@ -202,7 +203,8 @@ fn weight(point: &Counting, usual_px2: f64) -> f64 {
     (2.0 * usual_px2 / (point.variance_px2 + usual_px2)).sqrt()
 }
 
-/// How many corners there are beyond those that lay the lines, how many the longest line has, and how many lines have more than two.
+/// How many corners there are beyond those that lay the lines, how many the longest line has, and how many lines have
+/// more than two.
 fn freedom(points: &[Counting]) -> (usize, usize, usize) {
     let lines = points.chunk_by(|a, b| a.line == b.line).map(|line| line.len());
     lines

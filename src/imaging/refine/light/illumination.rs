@@ -1,14 +1,15 @@
 //! What the light over a whole board says of its gradient at one corner.
 //!
-//! In: the fits of a board's corners, each with a gradient of the light of its own. Out: the same fits with the gradient that
-//! their board tells. A gradient makes one end of an edge brighter than the other, which a wide blur cannot
-//! tell from a shift: by gradient times blur squared. Fitting both costs a fifth to two fifths of the precision at a blur of
-//! 2.5 px in squares of 24 px. Light varies smoothly over a board, so its other corners know the gradient.
+//! In: the fits of a board's corners, each with a gradient of the light of its own. Out: the same fits with the
+//! gradient that their board tells. A gradient makes one end of an edge brighter than the other, which a wide blur
+//! cannot tell from a shift: by gradient times blur squared. Fitting both costs a fifth to two fifths of the precision
+//! at a blur of 2.5 px in squares of 24 px. Light varies smoothly over a board, so its other corners know the gradient.
 //!
-//! Method: a polynomial of the place (degree 1 or 2, by the number of corners) through all gradients, robust; what they scatter
-//! about it beyond their own uncertainty is how far the light is not smooth, and both together are a prior for each corner.
-//! Fits are linear near their end, so that a prior is a step and needs no second fit: the conditional mean of a normal distribution.
-//! Goes wrong: shadows, glare; a gradient far from the board's stays what it was, and rough light makes the prior weak.
+//! Method: a polynomial of the place (degree 1 or 2, by the number of corners) through all gradients, robust; what they
+//! scatter about it beyond their own uncertainty is how far the light is not smooth, and both together are a prior for
+//! each corner. Fits are linear near their end, so that a prior is a step and needs no second fit: the conditional mean
+//! of a normal distribution. Goes wrong: shadows, glare; a gradient far from the board's stays what it was, and rough
+//! light makes the prior weak.
 
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2xX, Point2, Vector2};
 
@@ -110,8 +111,8 @@ mod tests {
     use super::*;
     use crate::imaging::refine::saddle_fit::{Fit, Model};
 
-    /// A board of fits whose places are off by what their gradients are off by, times a blur of 2 px squared; deviations of
-    /// the gradients repeat with period `prime`.
+    /// A board of fits whose places are off by what their gradients are off by, times a blur of 2 px squared;
+    /// deviations of the gradients repeat with period `prime`.
     fn board(columns: usize, rows: usize, light: impl Fn(Point2<f64>) -> Vector2<f64>) -> Lattice<Measured> {
         Lattice::from_fn(columns, rows, |col, row| {
             let at = Point2::new(col as f64 * 30.0, row as f64 * 30.0);

@@ -1,4 +1,5 @@
-//! What reaches a window beside the board's print: a gradient of the light, stray light, and the veil from which light counts.
+//! What reaches a window beside the board's print: a gradient of the light, stray light, and the veil from which light
+//! counts.
 
 pub mod illumination;
 pub mod stray;

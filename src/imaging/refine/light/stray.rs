@@ -1,8 +1,9 @@
 //! Stray light: what a glossy board reflects, or a lens scatters, beside the light that its print sends back.
 //!
-//! In: slopes of stray light that a board's corners were fitted with. Out: the variance of the slopes, a prior for fits that hold them. The
-//! light on a board is reflected by dark and bright squares in proportion to their reflectance, stray light adds to both alike. Taken for the
-//! former its slope bends the profile of the edges, each arm to another side. Goes wrong: a highlight's own edge, which is no slope.
+//! In: slopes of stray light that a board's corners were fitted with. Out: the variance of the slopes, a prior for fits
+//! that hold them. The light on a board is reflected by dark and bright squares in proportion to their reflectance,
+//! stray light adds to both alike. Taken for the former its slope bends the profile of the edges, each arm to another
+//! side. Goes wrong: a highlight's own edge, which is no slope.
 
 use nalgebra::{DMatrix, Matrix2, Point2, Vector2};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -41,7 +42,8 @@ pub fn variance(slopes: &[Slope]) -> Option<f64> {
     of_each.or_else(|| common_variance(&known))
 }
 
-/// The same of what the slopes have in common: a plane over the board, which shows where each slope alone is lost in its noise.
+/// The same of what the slopes have in common: a plane over the board, which shows where each slope alone is lost in
+/// its noise.
 fn common_variance(slopes: &[Slope]) -> Option<f64> {
     /// Terms of a plane.
     const TERMS: usize = 3;

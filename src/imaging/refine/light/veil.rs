@@ -1,10 +1,11 @@
 //! The grey value from which light counts: what a picture shows where no light comes from the board.
 //!
-//! A corner's model lets uneven light act on light and dark squares in proportion. That holds for what the board reflects, not for a camera's
-//! black level, for haze, for a picture whose contrast was stretched, or for a negative (where it is the white level). In: the picture and
-//! where the corners are about. Out: that grey value, whole. Method: over the board both kinds of squares follow the light, `grey = veil +
-//! light * reflectance`, hence the one is a straight line in the other, and meets it at the veil. Goes wrong: even light
-//! does not tell the veil; then none is needed, and zero is taken.
+//! A corner's model lets uneven light act on light and dark squares in proportion. That holds for what the board
+//! reflects, not for a camera's black level, for haze, for a picture whose contrast was stretched, or for a negative
+//! (where it is the white level). In: the picture and where the corners are about. Out: that grey value, whole. Method:
+//! over the board both kinds of squares follow the light, `grey = veil + light * reflectance`, hence the one is a
+//! straight line in the other, and meets it at the veil. Goes wrong: even light does not tell the veil; then none is
+//! needed, and zero is taken.
 
 use nalgebra::{Point2, Vector2};
 

@@ -19,7 +19,8 @@ pub struct Crossing {
     correlation_slope: f32,
     /// 1 / sqrt(1 - correlation^2).
     stretch: f32,
-    /// sin of each node of the integral over the correlation, -1 / (2 cos^2) of it, and the node's weight times 4 arcsin(correlation) / tau.
+    /// sin of each node of the integral over the correlation, -1 / (2 cos^2) of it, and the node's weight times 4
+    /// arcsin(correlation) / tau.
     nodes: [(f32, f32, f32); 6],
     /// The same for the correlation itself, with 4 / (tau cos).
     top: (f32, f32, f32),

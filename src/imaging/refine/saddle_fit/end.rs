@@ -1,7 +1,7 @@
 //! What a fit's equations tell at its end: place, covariance, misfits.
 //!
-//! In: a model that has settled, and its equations. Out: the fit. Stray light and bends of a window's own edges are parameters beyond the model's; a fit
-//! is linear near its end, so that one step takes them there.
+//! In: a model that has settled, and its equations. Out: the fit. Stray light and bends of a window's own edges are
+//! parameters beyond the model's; a fit is linear near its end, so that one step takes them there.
 
 use nalgebra::{SMatrix, SVector, Vector2};
 
@@ -30,8 +30,8 @@ pub(super) struct End<const C: usize, const P: usize> {
     pub(super) bends: [Option<f64>; 2],
 }
 
-/// Squared residuals that tell the noise of the edges, and their degrees of freedom. Where markers hide the middles of the light squares most pixels
-/// away from the edges are dark, and quieter than the edges as light itself is.
+/// Squared residuals that tell the noise of the edges, and their degrees of freedom. Where markers hide the middles of
+/// the light squares most pixels away from the edges are dark, and quieter than the edges as light itself is.
 fn noise_by(window: &Window, cost: f64, near_cost: f64) -> (f64, f64) {
     if window.hides { (near_cost, (window.near() - N) as f64) } else { (cost, (window.count() - N) as f64) }
 }
@@ -54,8 +54,8 @@ pub(super) fn plain(model: &Model, last: &Evaluation<COLUMNS>, window: &Window, 
     Some(end.fit(model.add(&(end.step - step), LEAST_BLUR_PX)))
 }
 
-/// Parameters of a fit that holds stray light, too: light that does not come from the board but from a reflection on it, and adds to dark and
-/// bright alike. Taken as light on the board its slope would move the edges.
+/// Parameters of a fit that holds stray light, too: light that does not come from the board but from a reflection on
+/// it, and adds to dark and bright alike. Taken as light on the board its slope would move the edges.
 pub(super) fn with_stray(model: &Model, window: &Window, (slope_variance, own): (f64, [bool; 2])) -> Option<Fit> {
     const PARAMETERS: [usize; N + 2] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, COLUMNS, COLUMNS + 1];
     let Evaluation { sums, near_cost, arms } = model.evaluate_with_stray(window);

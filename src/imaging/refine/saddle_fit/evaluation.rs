@@ -1,6 +1,7 @@
 //! What the pixels of a window make of a model: the sums of the derivatives' products that a least-squares step needs.
 //!
-//! Each kind of pixel has them from the fewest columns that span its derivatives, and a linear map takes those to the model's parameters.
+//! Each kind of pixel has them from the fewest columns that span its derivatives, and a linear map takes those to the
+//! model's parameters.
 
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, SMatrix, SVector, Vector2, Vector4};
 
@@ -12,11 +13,13 @@ use crate::widest::widest;
 
 /// What the derivatives along an arm are made of: see [`along`].
 const ARM: usize = 8;
-/// The same where stray light is looked for, too, whose slopes along x and y have columns of their own after all others.
+/// The same where stray light is looked for, too, whose slopes along x and y have columns of their own after all
+/// others.
 pub const STRAY_COLUMNS: usize = COLUMNS + 2;
 const STRAY_ARM: usize = ARM + 2;
 
-/// What all pixels of a window make of a model, by `C` columns: the parameters' derivatives, the residual, and perhaps those of stray light.
+/// What all pixels of a window make of a model, by `C` columns: the parameters' derivatives, the residual, and perhaps
+/// those of stray light.
 pub struct Evaluation<const C: usize> {
     /// Sums of the columns' products over all pixels.
     pub sums: SMatrix<f64, C, C>,
@@ -51,7 +54,8 @@ pub struct Misfit {
     pub freedom: f64,
 }
 
-/// What an arm tells by itself: where its edge would lie and run, a step aside and a turn, if it were free of the common model.
+/// What an arm tells by itself: where its edge would lie and run, a step aside and a turn, if it were free of the
+/// common model.
 #[derive(Debug, Clone, Copy)]
 pub struct Arm<const C: usize> {
     /// Normal matrix of step and turn.
@@ -76,13 +80,15 @@ impl<const C: usize> Arm<C> {
     }
 }
 
-/// The least of an arm's turn that its step does not explain, as a share: a thousand times the rounding of sums of seven digits.
+/// The least of an arm's turn that its step does not explain, as a share: a thousand times the rounding of sums of
+/// seven digits.
 const LEAST_APART: f64 = 1e-4;
 
-/// What the two arms of an edge miss the common model by, as `[bent, apart]`: the one how they run through the crossing aside of it and turn against
-/// each other, the other how far they are apart there and turn alike. Each is free of the other; chi-squared in units of the residuals' variance
-/// times it, and what that is in the mean where residuals are noise and nothing else: two, less what the common fit of `parameters` has taken, whose
-/// covariance over that variance `inverse` is. `None` where one arm does not determine its edge.
+/// What the two arms of an edge miss the common model by, as `[bent, apart]`: the one how they run through the crossing
+/// aside of it and turn against each other, the other how far they are apart there and turn alike. Each is free of the
+/// other; chi-squared in units of the residuals' variance times it, and what that is in the mean where residuals are
+/// noise and nothing else: two, less what the common fit of `parameters` has taken, whose covariance over that variance
+/// `inverse` is. `None` where one arm does not determine its edge.
 pub fn misfits<const C: usize, const P: usize>(
     arms: &[Arm<C>; 2],
     (parameters, step): (&[usize; P], &[f64]),
@@ -223,7 +229,8 @@ impl Model {
 /// A parameter, a column, and how much of the column the derivative by the parameter holds.
 type Share = (usize, usize, f64);
 
-/// Adds the sums of the derivatives' products, from those of the columns that they are made of. Most shares are none, so they are listed.
+/// Adds the sums of the derivatives' products, from those of the columns that they are made of. Most shares are none,
+/// so they are listed.
 fn add_mapped<const C: usize, const A: usize>(to: &mut SMatrix<f64, C, C>, map: &[Share], sums: &SMatrix<f64, A, A>) {
     for &(row, a, share) in map {
         for &(column, b, other) in map {
@@ -232,8 +239,9 @@ fn add_mapped<const C: usize, const A: usize>(to: &mut SMatrix<f64, C, C>, map: 
     }
 }
 
-/// On an arm of an edge, E is `side` times the edge's erf, and every derivative is a combination of: the derivative by u, the same times
-/// the place along the edge, the same in blurs from it; light; light times E; x and y times what is reflected; the residual.
+/// On an arm of an edge, E is `side` times the edge's erf, and every derivative is a combination of: the derivative by
+/// u, the same times the place along the edge, the same in blurs from it; light; light times E; x and y times what is
+/// reflected; the residual.
 #[inline(always)]
 fn along<const A: usize>(edge: &Edge, light: &Light, side: f32, group: &Group, products: &mut Products<A>) {
     let across = edge.across(group);
@@ -270,8 +278,9 @@ fn stray_columns(group: &Group, columns: &mut [Lanes]) {
     }
 }
 
-/// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn. One of a pixel or two, or of pixels
-/// that all lie as far from the crossing, does not tell the two apart: what is left of their products is rounding.
+/// An arm by the products of [`along`]'s columns, of which the first two are the derivatives by its step and its turn.
+/// One of a pixel or two, or of pixels that all lie as far from the crossing, does not tell the two apart: what is left
+/// of their products is rounding.
 fn by_itself<const C: usize, const A: usize>(map: &[Share], sums: &SMatrix<f64, A, A>) -> Arm<C> {
     let normal = sums.fixed_view::<2, 2>(0, 0).into_owned();
     let apart = 1.0 - normal.m12 * normal.m21 / (normal.m11 * normal.m22);

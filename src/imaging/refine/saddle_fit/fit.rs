@@ -18,9 +18,11 @@ pub struct Fit {
     pub place_by_light: Matrix2<f64>,
     /// Covariance of the light's slope, 1/px^2.
     pub light_covariance: Matrix2<f64>,
-    /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against the common model.
+    /// For each edge, on either side of the crossing: chi-squared (two degrees of freedom) of that arm's edge against
+    /// the common model.
     pub arm_misfit: [[f64; 2]; 2],
-    /// By how much both edges bend at the crossing, and by how much their arms are apart there, beyond the common model.
+    /// By how much both edges bend at the crossing, and by how much their arms are apart there, beyond the common
+    /// model.
     pub misfits: [Misfit; 2],
     /// Slope of stray light, grey values per px, and its covariance, where it was looked for.
     pub stray: Option<(Vector2<f64>, Matrix2<f64>)>,

@@ -1,9 +1,10 @@
 //! One corner fitted to raw pixels, at the limit that noise allows.
 //!
-//! In: pixels and a start good to a few blurs. Out: place, covariance (residual variance times inverse normal matrix), blur,
-//! contrast, residual. Method: [`model`]'s ten parameters by Levenberg-Marquardt (Marquardt 1963), analytic derivatives.
-//! Two blurs, the edges' directions, both grey levels and the gradient of the light are fitted with the corner; the edges' bend
-//! (lens distortion) is given, or the window's own where nothing else tells it (`own_bends`). Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
+//! In: pixels and a start good to a few blurs. Out: place, covariance (residual variance times inverse normal matrix),
+//! blur, contrast, residual. Method: [`model`]'s ten parameters by Levenberg-Marquardt (Marquardt 1963), analytic
+//! derivatives. Two blurs, the edges' directions, both grey levels and the gradient of the light are fitted with the
+//! corner; the edges' bend (lens distortion) is given, or the window's own where nothing else tells it (`own_bends`).
+//! Goes wrong: too few pixels, no contrast, an edge that is not there; all end in `None`.
 
 mod crossing;
 mod end;
@@ -26,8 +27,9 @@ use window::Window;
 
 /// Steps after which a fit that still moves is given up; a good start needs three to six.
 const MAX_STEPS: usize = 40;
-/// Least blur, px, for fits that do not settle with [`LEAST_BLUR_PX`]: an edge so steep between two rows of pixels may lie anywhere there, one that is as wide as
-/// the pixels are apart lies in one place. What the profile then misses is alike on both sides.
+/// Least blur, px, for fits that do not settle with [`LEAST_BLUR_PX`]: an edge so steep between two rows of pixels may
+/// lie anywhere there, one that is as wide as the pixels are apart lies in one place. What the profile then misses is
+/// alike on both sides.
 const SMOOTH_BLUR_PX: f64 = 0.5;
 
 impl Model {
@@ -58,7 +60,8 @@ impl Model {
     }
 }
 
-/// Solves for level and contrast, where the start has none, with the rest as it is and even light. `None` where the pixels don't determine them.
+/// Solves for level and contrast, where the start has none, with the rest as it is and even light. `None` where the
+/// pixels don't determine them.
 fn with_levels(start: &Model, window: &Window) -> Option<Model> {
     if start.half_contrast != 0.0 {
         return Some(*start);
@@ -96,11 +99,13 @@ pub fn fit(start: &Model, window: &Window, beside: Beside) -> Option<Fit> {
     (fit.covariance_px2.iter().all(|v| v.is_finite()) && last.cost().is_finite()).then_some(fit)
 }
 
-/// The model at the end of all steps, what the pixels made of it one short step before, and the number of steps; with blurs of `least` px at the least.
+/// The model at the end of all steps, what the pixels made of it one short step before, and the number of steps; with
+/// blurs of `least` px at the least.
 fn settled(start: Model, window: &Window, freedom: f64, least: f64) -> Option<(Model, Evaluation<COLUMNS>, usize)> {
-    /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a third of its sigma;
-    /// that step is still taken, and steps shrink at least tenfold by then, so less than a thirtieth is left. Of 2400 corners half were
-    /// within 0.0002 sigma of where further steps took them, and 99 of 100 within 0.002.
+    /// Where the undamped step would gain less than this share of one pixel's variance, nothing moves by more than a
+    /// third of its sigma; that step is still taken, and steps shrink at least tenfold by then, so less than a
+    /// thirtieth is left. Of 2400 corners half were within 0.0002 sigma of where further steps took them, and 99 of 100
+    /// within 0.002.
     const SETTLED: f64 = 0.1;
     /// What the seven digits of a pixel's numbers do to its residual at the most, as a share of its grey value.
     const ROUNDING: f64 = 5e-7;

@@ -9,8 +9,9 @@
 //! ```
 //!
 //! E is the sign pattern of two crossing lines under a Gaussian blur: the normal integral's dependence on the
-//! correlation is that of Drezner and Wesolowsky (1990). Where only the quadrant on the sides `d_1`, `d_2` of the edges is dark, the corner of a tag that
-//! nothing dark touches, E is `(E + d_2 erf(a/sqrt2) + d_1 erf(b/sqrt2) - d_1 d_2) / 2`: the same in that quadrant and on its edges, constant elsewhere.
+//! correlation is that of Drezner and Wesolowsky (1990). Where only the quadrant on the sides `d_1`, `d_2` of the edges
+//! is dark, the corner of a tag that nothing dark touches, E is `(E + d_2 erf(a/sqrt2) + d_1 erf(b/sqrt2) - d_1 d_2) /
+//! 2`: the same in that quadrant and on its edges, constant elsewhere.
 
 use nalgebra::Vector2;
 
@@ -22,7 +23,8 @@ use std::f32::consts::{FRAC_1_SQRT_2, FRAC_2_SQRT_PI};
 pub const N: usize = 10;
 /// The parameters' derivatives and the residual.
 pub const COLUMNS: usize = N + 1;
-/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that no pixel sees.
+/// Least blur, px: that of the box of a pixel alone, 1/sqrt(12). Sharpened pictures would fit less, with a slope that
+/// no pixel sees.
 pub const LEAST_BLUR_PX: f64 = 0.3;
 
 /// The corner; places relative to the window's start.

@@ -1,8 +1,9 @@
 //! How the edges of one window bend, by its own pixels.
 //!
-//! In: the end of a fit whose edges had given bends, and which of these nothing else tells. Out: the same with these bends found. Method: a further
-//! parameter of a linear problem is one step of elimination. An arm's normal matrix of step and turn says where along the edge its pixels lie, and
-//! so what step and turn a bend is for it. Goes wrong: a bend that takes the edge's ends out of their blur needs another fit from where this one ended.
+//! In: the end of a fit whose edges had given bends, and which of these nothing else tells. Out: the same with these
+//! bends found. Method: a further parameter of a linear problem is one step of elimination. An arm's normal matrix of
+//! step and turn says where along the edge its pixels lie, and so what step and turn a bend is for it. Goes wrong: a
+//! bend that takes the edge's ends out of their blur needs another fit from where this one ended.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 

@@ -1,8 +1,8 @@
 //! The pixels that one corner is fitted to, sorted by what they can tell.
 //!
-//! A window is a parallelogram along the corner's two edges. Pixels near both edges, at the crossing, see all of the model;
-//! those near one edge alone, on an arm of the cross, see that edge; those away from both see only the two
-//! grey levels and the light, and enter as sums. Saturated pixels, and what else is not to be kept, are left out.
+//! A window is a parallelogram along the corner's two edges. Pixels near both edges, at the crossing, see all of the
+//! model; those near one edge alone, on an arm of the cross, see that edge; those away from both see only the two grey
+//! levels and the light, and enter as sums. Saturated pixels, and what else is not to be kept, are left out.
 
 use std::ops::Range;
 
@@ -14,13 +14,13 @@ use crate::widest::widest;
 /// Pixels that are worked on side by side: enough that the compiler makes vector loops of them.
 pub const LANES: usize = 32;
 
-/// About so many rows of a window give pixels away from both edges, all where it has less than twice as many: in a large window they are
-/// so many that what they tell, two levels and the light's slope, is known far better than the corner. The step from one to the next is odd,
-/// so that both fields of an interlaced picture are seen.
+/// About so many rows of a window give pixels away from both edges, all where it has less than twice as many: in a
+/// large window they are so many that what they tell, two levels and the light's slope, is known far better than the
+/// corner. The step from one to the next is odd, so that both fields of an interlaced picture are seen.
 const FLAT_ROWS: usize = 100;
 
-/// A number for each pixel of a group. Of seven digits, so that twice as many fit side by side: what rounding adds to a residual is a
-/// hundred-thousandth of the contrast, far less than any camera's noise; sums are of sixteen.
+/// A number for each pixel of a group. Of seven digits, so that twice as many fit side by side: what rounding adds to a
+/// residual is a hundred-thousandth of the contrast, far less than any camera's noise; sums are of sixteen.
 pub type Lanes = [f32; LANES];
 
 /// A few pixels side by side, places relative to the window's start.
@@ -54,10 +54,12 @@ pub struct Groups {
 pub struct Window {
     /// Near both edges.
     pub crossing: Groups,
-    /// Near edge `k` alone, on the side of the other edge where its normal's product is negative, then where it is positive.
+    /// Near edge `k` alone, on the side of the other edge where its normal's product is negative, then where it is
+    /// positive.
     pub arms: [[Groups; 2]; 2],
     /// Away from both edges, where the product of both normals' products is negative, then where it is positive: the
-    /// sums of all products of `(1, x, y, grey)`. Of a corner with one dark quadrant that one alone, and all that is light.
+    /// sums of all products of `(1, x, y, grey)`. Of a corner with one dark quadrant that one alone, and all that is
+    /// light.
     pub flat: [Matrix4<f64>; 2],
     /// Number of pixels that were not kept.
     pub left_out: usize,
@@ -76,7 +78,8 @@ pub struct Frame {
     pub band_px: f64,
     /// What is printed in two of the squares and is none of the corner's: pixels in it are no part of the window.
     pub hidden: [Option<Quad>; 2],
-    /// The signs of both edges' normals' products where the only dark quadrant is: elsewhere nothing is seen of the edges but at their crossing.
+    /// The signs of both edges' normals' products where the only dark quadrant is: elsewhere nothing is seen of the
+    /// edges but at their crossing.
     pub dark: Option<[f64; 2]>,
 }
 
@@ -157,7 +160,8 @@ impl Window {
         self.near() + self.flat.iter().map(|sums| sums[(0, 0)] as usize).sum::<usize>()
     }
 
-    /// Fills the window anew with the pixels that are to be kept, as grey values above a whole number `veil`. Nothing is in a window without area.
+    /// Fills the window anew with the pixels that are to be kept, as grey values above a whole number `veil`. Nothing
+    /// is in a window without area.
     pub fn collect<T: Sample>(&mut self, image: &Image<T>, veil: f64, keep: &impl Keep, frame: &Frame) {
         widest(
             #[inline(always)]
@@ -276,8 +280,8 @@ fn highest<T: Sample>(values: &[T]) -> f64 {
     f64::from(highest)
 }
 
-/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence exact; the veil is taken
-/// off at the end.
+/// Number, sums of x, x^2, grey, x grey and grey^2 of pixels side by side, the first at x = 0. Whole numbers, hence
+/// exact; the veil is taken off at the end.
 #[inline(always)]
 fn run_sums<T: Sample>(values: &[T], veil: f64) -> [f64; 6] {
     let (mut g, mut xg, mut gg) = ([0u64; SIDE_BY_SIDE], [0u64; SIDE_BY_SIDE], [0u64; SIDE_BY_SIDE]);
@@ -360,7 +364,8 @@ impl Cut {
         self.dark.is_none_or(|dark| dark[across] == side[across])
     }
 
-    /// Which of the flats pixels on such sides of both edges belong to that see none, near whose lines they may be all the same.
+    /// Which of the flats pixels on such sides of both edges belong to that see none, near whose lines they may be all
+    /// the same.
     fn alike(&self, side: [usize; 2], near: [bool; 2]) -> usize {
         match self.dark {
             Some(dark) if near != [false; 2] || dark != side => usize::from(dark[0] != dark[1]),

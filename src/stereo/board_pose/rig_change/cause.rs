@@ -1,8 +1,9 @@
-//! What may have happened to the rig or to the target's description, one number each, and how well each explains the poses.
+//! What may have happened to the rig or to the target's description, one number each, and how well each explains the
+//! poses.
 //!
-//! In: the common minimum. Out: for every cause its amount and the fall of chi-square it would bring. The rig's causes are physical: the
-//! right camera turns about its own centre or is pushed, a lens is refocused. A longer baseline and smaller squares explain the same:
-//! pictures have no scale of their own, so both are named.
+//! In: the common minimum. Out: for every cause its amount and the fall of chi-square it would bring. The rig's causes
+//! are physical: the right camera turns about its own centre or is pushed, a lens is refocused. A longer baseline and
+//! smaller squares explain the same: pictures have no scale of their own, so both are named.
 
 use std::ops::AddAssign;
 
@@ -210,9 +211,9 @@ pub(in crate::stereo::board_pose) fn stretch(found: &Estimate<'_>) -> [f64; 2] {
     [mode.dot(&deviations) / length, variance.max(0.0).sqrt() / length]
 }
 
-/// By how much the mark point of each pose moves from one minimum to another, mm, but for a turn of all points about the left camera. Where
-/// the left camera's axis points is a word of its lens: with an open tilt of the sensor or an open picture centre, all points turn together, and
-/// nothing that is measured between them does.
+/// By how much the mark point of each pose moves from one minimum to another, mm, but for a turn of all points about
+/// the left camera. Where the left camera's axis points is a word of its lens: with an open tilt of the sensor or an
+/// open picture centre, all points turn together, and nothing that is measured between them does.
 pub(in crate::stereo::board_pose) fn shifts_mm(a: &Estimate<'_>, b: &Estimate<'_>) -> Vec<Option<Vector3<f64>>> {
     let both = a.values.poses.iter().zip(&b.values.poses);
     let points: Vec<_> =

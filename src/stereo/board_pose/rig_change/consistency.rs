@@ -1,11 +1,12 @@
 //! Whether every pose fits what all of them share, and from where on they no longer do.
 //!
-//! A pose whose two pictures were taken at two moments, and a rig that moved or creeps during the run, look alike: at some poses
-//! `right_from_left` is not the one of the others. Six numbers of such a change are tested by Rao's score at the common minimum, for
-//! every pose by itself, for all poses from one on, and for a change that grows from pose to pose; nothing is fitted again for it.
-//! Chi-square falls by the score, with six degrees of freedom where nothing is wrong. How far poses scatter is not known before: pictures that
-//! were not taken at one moment scatter more than their corners. A change along the run is therefore told by how much it takes off what
-//! the poses leave together, whatever the common fit made of their noise.
+//! A pose whose two pictures were taken at two moments, and a rig that moved or creeps during the run, look alike: at
+//! some poses `right_from_left` is not the one of the others. Six numbers of such a change are tested by Rao's score at
+//! the common minimum, for every pose by itself, for all poses from one on, and for a change that grows from pose to
+//! pose; nothing is fitted again for it. Chi-square falls by the score, with six degrees of freedom where nothing is
+//! wrong. How far poses scatter is not known before: pictures that were not taken at one moment scatter more than their
+//! corners. A change along the run is therefore told by how much it takes off what the poses leave together, whatever
+//! the common fit made of their noise.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
 use rayon::prelude::*;
@@ -59,7 +60,8 @@ pub fn of_member(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change>
 
 /// What a change would gain at a pose that had no part in the minimum.
 pub fn of_outsider(part: &Eliminated, covariance: &DMatrix<f64>) -> Option<Change> {
-    // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to find.
+    // The gradient scatters with the pose's own corners and with the shared values, which its corners did not help to
+    // find.
     score(&part.change, &part.change_shared, &part.change_gradient, &-covariance)
 }
 
@@ -82,7 +84,8 @@ pub fn along(normal: &Normal, covariance: &DMatrix<f64>) -> Option<Along> {
     Some(Along { change, shares, from, creeps, gain, evidence })
 }
 
-/// Which share each pose has of a change that grows evenly from the first that takes part to the last. `None` where there are no two.
+/// Which share each pose has of a change that grows evenly from the first that takes part to the last. `None` where
+/// there are no two.
 pub fn shares_that_grow(normal: &Normal) -> Option<Vec<f64>> {
     let first = normal.poses.iter().position(Option::is_some)?;
     let last = normal.poses.iter().rposition(Option::is_some).filter(|last| *last > first)?;

@@ -13,7 +13,8 @@ use crate::stereo::{Rig, Side};
 /// Fewest poses: two hardly contradict any place.
 const FEWEST: usize = 3;
 
-/// Median over the poses of the root mean square length of what is left in the worse picture, px. `None` of too few poses.
+/// Median over the poses of the root mean square length of what is left in the worse picture, px. `None` of too few
+/// poses.
 pub(in crate::stereo::board_pose) fn misfit_px(rig: &Rig, views: &[View], starts: &[Start]) -> Option<f64> {
     const PLACE: Layout = Layout { left: None, right: None, transform: true, shape: false };
     let with_pose = views.iter().zip(starts).filter_map(|(view, start)| Some((view.clone(), start.pose?)));

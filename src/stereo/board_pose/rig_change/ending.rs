@@ -1,7 +1,7 @@
 //! What ends a run, or a part of it: a change along the run, and a rig that is another from pose to pose.
 //!
-//! A change ends the run where it moves points by more than their own uncertainty allows, not where it is significant: what it moves by less is
-//! added to the points' covariance.
+//! A change ends the run where it moves points by more than their own uncertainty allows, not where it is significant:
+//! what it moves by less is added to the points' covariance.
 
 use nalgebra::Vector3;
 
@@ -22,8 +22,8 @@ const MOVED_LIMIT: f64 = 60.0;
 const EACH_POSE: f64 = 20.0;
 
 impl<'a> Run<'a> {
-    /// Poses that scatter about the common rig so far that the usual one would not be believed where poses scatter as the pairs of the
-    /// calibration, and whose points are therefore of no use.
+    /// Poses that scatter about the common rig so far that the usual one would not be believed where poses scatter as
+    /// the pairs of the calibration, and whose points are therefore of no use.
     pub(in crate::stereo::board_pose) fn loose(&self, found: &Estimate<'_>) -> Option<Judgement> {
         self.known.pair_excess?;
         let times = found.excess / self.known.usual().excess_here(&found.noise, &found.bundle.views);
@@ -32,14 +32,14 @@ impl<'a> Run<'a> {
             .then(|| Judgement::Loose { times: times.sqrt(), sigma_mm })
     }
 
-    /// Leaves the poses from a change along the run on out, where it moves points by more than their uncertainty allows. `worst` is the
-    /// score of the worst pose by itself.
+    /// Leaves the poses from a change along the run on out, where it moves points by more than their uncertainty
+    /// allows. `worst` is the score of the worst pose by itself.
     pub(in crate::stereo::board_pose) fn ends_early(&mut self, found: &Estimate<'a>, worst: f64) -> bool {
         self.along = None;
         let Some(along) = consistency::along(&found.normal, &found.covariance) else { return false };
         let after = (along.from..self.taking_part.len()).filter(|&i| self.taking_part[i]).count();
-        // A calibration that does not say how well it is known is a little wrong everywhere, which many poses together would show: then
-        // every pose after the change must show it.
+        // A calibration that does not say how well it is known is a little wrong everywhere, which many poses together
+        // would show: then every pose after the change must show it.
         let each = if self.known.rig.covariance.is_none() { EACH_POSE * after as f64 } else { 0.0 };
         if after < 2 || along.evidence <= MOVED_LIMIT || along.gain <= each || along.change.fall <= 1.5 * worst {
             return false;
@@ -57,8 +57,8 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// By how much a whole change exceeds the points' uncertainty, as chi-square with three degrees of freedom. The uncertainty is that of
-    /// poses on one side of the change: the common minimum takes it for noise.
+    /// By how much a whole change exceeds the points' uncertainty, as chi-square with three degrees of freedom. The
+    /// uncertainty is that of poses on one side of the change: the common minimum takes it for noise.
     fn beyond(&self, found: &Estimate<'a>, along: &Along) -> f64 {
         let present: Vec<usize> = (0..self.taking_part.len()).filter(|&i| self.taking_part[i]).collect();
         let before = present.iter().filter(|&&i| i < along.from).count();

@@ -1,9 +1,9 @@
-//! Whether the rig is the one that was calibrated and the target the one that was described; what changed if not, and how far that
-//! reaches into the points.
+//! Whether the rig is the one that was calibrated and the target the one that was described; what changed if not, and
+//! how far that reaches into the points.
 //!
-//! Every [`Cause`] is fitted with nothing known of it beforehand; the most likely one is named with its equals. A change that moves the
-//! points by less than the tolerance, or than their own uncertainty allows, goes into their covariance: the calibration is believed only
-//! as far as the change reaches. A larger one ends the run.
+//! Every [`Cause`] is fitted with nothing known of it beforehand; the most likely one is named with its equals. A
+//! change that moves the points by less than the tolerance, or than their own uncertainty allows, goes into their
+//! covariance: the calibration is believed only as far as the change reaches. A larger one ends the run.
 
 use nalgebra::Vector3;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -16,7 +16,8 @@ use crate::stereo::board_pose::solve::estimate::{Estimate, Usual, estimate};
 use crate::stereo::board_pose::solve::prior::{bent_modes, stretch_length_mm};
 use crate::stereo::data::residuals::root_mean_square;
 
-/// A cause that lowers chi-square by less than this is chance, where the scatter of the poses is known before: four standard deviations.
+/// A cause that lowers chi-square by less than this is chance, where the scatter of the poses is known before: four
+/// standard deviations.
 const CHANCE: f64 = 16.0;
 
 /// The probability of that.
@@ -34,7 +35,8 @@ const COMPARED_ON: usize = 48;
 /// Whitened squares beyond this count as this much in the likelihood: outliers.
 const MOST_SQUARE: f64 = 28.0;
 
-/// Chi-square of three degrees of freedom that 95 % of all points stay below: a shift beyond it is more than a point's uncertainty allows.
+/// Chi-square of three degrees of freedom that 95 % of all points stay below: a shift beyond it is more than a point's
+/// uncertainty allows.
 pub(in crate::stereo::board_pose) const ALLOWED: f64 = 7.815;
 
 /// What is found of the rig.
@@ -46,8 +48,8 @@ pub struct Changed {
     pub moves_mm: f64,
     /// By how much that exceeds their uncertainty: chi-square with three degrees of freedom, the median over the poses.
     pub beyond: f64,
-    /// By how much the points are off if it is the rig that is scaled and not the target, mm, where that is more and their covariance does not allow
-    /// for it.
+    /// By how much the points are off if it is the rig that is scaled and not the target, mm, where that is more and
+    /// their covariance does not allow for it.
     pub scaled_mm: Option<f64>,
 }
 
@@ -73,7 +75,8 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     let Some(&(least, first)) = fitted.first() else { return (found, None) };
     let equals = fitted.iter().filter(|(d, _)| d - least <= AS_LIKELY).map(|(_, e)| *e).collect();
     let equals = with_growing(&found, best, equals);
-    // The change is allowed for as something of the rig: with a pitch that is off instead, the points stay where they are.
+    // The change is allowed for as something of the rig: with a pitch that is off instead, the points stay where they
+    // are.
     let on_rig = fitted.iter().map(|(_, e)| e).find(|e| e.cause != Cause::Pitch).unwrap_or(&first);
     let known = on_rig.amount.powi(2).max(f64::MIN_POSITIVE);
     let Some(free) = with_cause(&found, on_rig, f64::INFINITY, usual) else { return (found, None) };
@@ -82,7 +85,8 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
         (moves_mm, beyond(&found, &free, shifts_mm))
     };
     let (moves_mm, beyond) = by(&shifts_mm(&found, &free));
-    // A target that is larger and a rig that is smaller by one share look the same, whatever became of the fit with the latter.
+    // A target that is larger and a rig that is smaller by one share look the same, whatever became of the fit with the
+    // latter.
     let if_scaled = || {
         let scaled = |pose: &Transform| pose.translation.vector * (first.amount / (1.0 + first.amount));
         by(&found.values.poses.iter().map(|pose| pose.as_ref().map(scaled)).collect::<Vec<_>>())
@@ -96,8 +100,8 @@ pub(in crate::stereo::board_pose) fn judge<'a>(found: Estimate<'a>, usual: Usual
     }
 }
 
-/// The causes with those that grow along the run before them, where one of those explains more than any that the whole run has: `best` is by how much
-/// the best of these lowers chi-square.
+/// The causes with those that grow along the run before them, where one of those explains more than any that the whole
+/// run has: `best` is by how much the best of these lowers chi-square.
 fn with_growing(found: &Estimate<'_>, best: f64, equals: Vec<Explanation>) -> Vec<Explanation> {
     let mut growing = growing(found).unwrap_or_default();
     growing.sort_by(|a, b| b.fall.total_cmp(&a.fall));
@@ -107,8 +111,8 @@ fn with_growing(found: &Estimate<'_>, best: f64, equals: Vec<Explanation>) -> Ve
     growing
 }
 
-/// By how much chance alone lowers chi-square. Where the poses scatter more than the pairs of the calibration did, by how much is known from as
-/// many poses as there are: the limit is then that of F.
+/// By how much chance alone lowers chi-square. Where the poses scatter more than the pairs of the calibration did, by
+/// how much is known from as many poses as there are: the limit is then that of F.
 fn chance(found: &Estimate<'_>, usual: Usual) -> f64 {
     let poses = found.values.poses.iter().flatten().count() as f64;
     let own = found.excess > usual.excess_here(&found.noise, &found.bundle.views).max(1.0);
@@ -116,7 +120,8 @@ fn chance(found: &Estimate<'_>, usual: Usual) -> f64 {
     limit.ok().filter(|_| own).map_or(CHANCE, |limit| limit.max(CHANCE))
 }
 
-/// By how much the points move between two minima, in units of what the second leaves open of each and the first of what they share.
+/// By how much the points move between two minima, in units of what the second leaves open of each and the first of
+/// what they share.
 fn beyond(known: &Estimate<'_>, free: &Estimate<'_>, shifts_mm: &[Option<Vector3<f64>>]) -> f64 {
     let each = shifts_mm.iter().enumerate().filter_map(|(i, shift_mm)| free.beyond(known, i, shift_mm.as_ref()?));
     median(each).unwrap_or(0.0)
@@ -141,7 +146,8 @@ fn subset<'a>(found: &Estimate<'a>) -> Estimate<'a> {
 fn with_cause<'a>(found: &Estimate<'a>, cause: &Explanation, variance: f64, usual: Usual) -> Option<Estimate<'a>> {
     let mut bundle = found.bundle.clone();
     let mut values = found.values.clone();
-    // From the rig that was calibrated: what a fit without the cause made of the rig is far off where a lens leaves much open.
+    // From the rig that was calibrated: what a fit without the cause made of the rig is far off where a lens leaves
+    // much open.
     values.rig.fill(0.0);
     match cause.cause.direction(&bundle.rig.rig_at(&values.rig)) {
         Some(direction) => {

@@ -1,8 +1,9 @@
-//! Whether the rig, or the target, is another than was calibrated: at one pose, from one pose on, or during the whole run.
+//! Whether the rig, or the target, is another than was calibrated: at one pose, from one pose on, or during the whole
+//! run.
 //!
-//! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the whole run,
-//! `flip` is of pictures that are the other way round, `elsewhere` of a right camera that stands anywhere else, `ending` ends the run where the points are off by more than they may be, and a
-//! `judgement` says it in words.
+//! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the
+//! whole run, `flip` is of pictures that are the other way round, `elsewhere` of a right camera that stands anywhere
+//! else, `ending` ends the run where the points are off by more than they may be, and a `judgement` says it in words.
 
 pub mod cause;
 pub(in crate::stereo::board_pose) mod consistency;

@@ -36,7 +36,8 @@ pub struct Alone {
     pub freedom: f64,
     /// Root mean square of the length of the 2-D residuals, px.
     pub rms_px: f64,
-    /// Root mean square distance of the triangulated corners from the target, mm; `None` where no corner is in use in both pictures.
+    /// Root mean square distance of the triangulated corners from the target, mm; `None` where no corner is in use in
+    /// both pictures.
     pub fit_rms_mm: Option<f64>,
 }
 
@@ -45,7 +46,8 @@ impl<'a> Known<'a> {
         Known { scene: found.bundle.scene(&found.values), found }
     }
 
-    /// Fits a pose. The whiteners are the estimate's. `None` where the corners do not determine it or most of them are outliers.
+    /// Fits a pose. The whiteners are the estimate's. `None` where the corners do not determine it or most of them are
+    /// outliers.
     pub fn fit(&self, view: &View, start: &Transform) -> Option<Alone> {
         let mut view = view.clone();
         view.observations.iter_mut().for_each(|o| o.active = true);

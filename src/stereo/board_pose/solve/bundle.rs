@@ -1,8 +1,10 @@
-//! One weighted least squares over all poses: the rig within its calibration, the target's crossings within their certificate.
+//! One weighted least squares over all poses: the rig within its calibration, the target's crossings within their
+//! certificate.
 //!
-//! In: views with whitened corners, what is known before, a start for every pose. Out: the values at the minimum and the normal
-//! equations there. Method: Gauss-Newton with the poses eliminated (Triggs et al. 2000, section 6.1); a step that does not lower the cost
-//! is halved. Poses are worked on in parallel and summed in their order, so that the bytes do not depend on the threads.
+//! In: views with whitened corners, what is known before, a start for every pose. Out: the values at the minimum and
+//! the normal equations there. Method: Gauss-Newton with the poses eliminated (Triggs et al. 2000, section 6.1); a step
+//! that does not lower the cost is halved. Poses are worked on in parallel and summed in their order, so that the bytes
+//! do not depend on the threads.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -19,8 +21,8 @@ use crate::stereo::solve::normal_equations::{inverse6, solve_scaled};
 /// Steps of one search at most; each squares what is left.
 const STEPS: usize = 12;
 
-/// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in squared residuals of
-/// unit variance. A thousandth of a standard deviation lowers it by a millionth.
+/// How close to the minimum a search goes: it is done when a step promises to lower the cost by less than this, in
+/// squared residuals of unit variance. A thousandth of a standard deviation lowers it by a millionth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Promise(pub f64);
 
@@ -161,7 +163,8 @@ impl Values {
 }
 
 impl Normal {
-    /// The step of the shared unknowns from these values, and by how much the cost would fall if the equations were straight.
+    /// The step of the shared unknowns from these values, and by how much the cost would fall if the equations were
+    /// straight.
     fn step(&self, shared: &DVector<f64>) -> Option<(DVector<f64>, f64)> {
         let gradient = &self.told.gradient + &self.weights * shared;
         let step = -solve_scaled(&(&self.told.matrix + &self.weights), &gradient)?;

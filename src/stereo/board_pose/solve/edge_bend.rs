@@ -1,8 +1,8 @@
 //! Where misprinted crossings are, behind the bent edges that their corners were measured on.
 //!
-//! In: where the corners were found, and what their windows see (`window`). Out: the crossings themselves and, for each corner, by how much what
-//! it sees lies off its crossing. Goes wrong: windows cut at one side, or edges that are not straight between crossings; what remains
-//! is found as scatter of that crossing's corners.
+//! In: where the corners were found, and what their windows see (`window`). Out: the crossings themselves and, for each
+//! corner, by how much what it sees lies off its crossing. Goes wrong: windows cut at one side, or edges that are not
+//! straight between crossings; what remains is found as scatter of that crossing's corners.
 
 use nalgebra::{Matrix2, Vector3};
 
@@ -33,9 +33,9 @@ fn straight_part(board: &Board, deviations_mm: &[Vector3<f64>]) -> Vec<Vector3<f
 }
 
 impl Bundle<'_> {
-    /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each corner sees. `told` is
-    /// how much of a change of what is seen a crossing follows, between none and one: of what a window hardly sees, corners that are known
-    /// badly would else make any deviation.
+    /// Sets the crossings to what their corners, each through its own window, show on the whole; and with it what each
+    /// corner sees. `told` is how much of a change of what is seen a crossing follows, between none and one: of what a
+    /// window hardly sees, corners that are known badly would else make any deviation.
     pub fn unbend(&mut self, values: &mut Values, told: &[Vector3<f64>]) {
         let board = self.board;
         let windows = Window::means(board, &self.views);
@@ -183,8 +183,9 @@ mod tests {
         }
     }
 
-    /// Of a board in few pictures that scatter, crossings keep to what was known of them, and windows as wide as the squares hardly see
-    /// that neighbours are off in turn: set to what is seen in full, the crossings would be farther off each time.
+    /// Of a board in few pictures that scatter, crossings keep to what was known of them, and windows as wide as the
+    /// squares hardly see that neighbours are off in turn: set to what is seen in full, the crossings would be farther
+    /// off each time.
     #[test]
     fn crossings_that_are_known_badly_do_not_run_away() {
         let (board, seen) = (board(), deviations());

@@ -1,9 +1,10 @@
-//! The bundle with its weights: how far corners scatter and how far the target's crossings deviate are found with the values.
+//! The bundle with its weights: how far corners scatter and how far the target's crossings deviate are found with the
+//! values.
 //!
-//! In: a bundle and a start. Out: the minimum with weights that its own residuals bear out. Method: robust rounds first; then least
-//! squares without outliers, in turn with the corners' noise (reduced chi-square one) and with the variance components of the crossings
-//! (MacKay's fixed point, the same as restricted maximum likelihood at its end). Goes wrong: one or two poses cannot tell print from
-//! noise; then the calibration's noise is taken.
+//! In: a bundle and a start. Out: the minimum with weights that its own residuals bear out. Method: robust rounds
+//! first; then least squares without outliers, in turn with the corners' noise (reduced chi-square one) and with the
+//! variance components of the crossings (MacKay's fixed point, the same as restricted maximum likelihood at its end).
+//! Goes wrong: one or two poses cannot tell print from noise; then the calibration's noise is taken.
 
 use std::borrow::Cow;
 
@@ -55,9 +56,11 @@ pub struct Estimate<'a> {
     /// Covariance of the shared unknowns.
     pub covariance: DMatrix<f64>,
     pub noise: Noise,
-    /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a variance.
+    /// How much larger the usual disagreement of a pose with the common rig is than its corners' scatter allows, as a
+    /// variance.
     pub excess: f64,
-    /// Factor on covariances for the information that neighbouring corners share, and the poses' excess; the whiteners hold it.
+    /// Factor on covariances for the information that neighbouring corners share, and the poses' excess; the whiteners
+    /// hold it.
     pub inflation: f64,
 }
 
@@ -77,8 +80,8 @@ impl Usual {
     }
 }
 
-/// The minimum roughly, by a loss that gross corners hardly move. The size of the board is free meanwhile: a target of quite another
-/// size, held to its own, would be seen as one whose edges all bend.
+/// The minimum roughly, by a loss that gross corners hardly move. The size of the board is free meanwhile: a target of
+/// quite another size, held to its own, would be seen as one whose edges all bend.
 fn roughly(bundle: &mut Bundle, mut values: Values) -> Option<Values> {
     let stretch_mm = std::mem::replace(&mut bundle.shape.stretch_mm, f64::INFINITY);
     for _ in 0..2 {
@@ -163,8 +166,8 @@ impl Estimate<'_> {
         Some(self.own_point_mm2(i)?.symmetric_eigenvalues().max().max(0.0).sqrt())
     }
 
-    /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its own, and what `known`
-    /// leaves open of all that the poses share.
+    /// By how much a shift of a pose's point exceeds its uncertainty, as chi-square with three degrees of freedom: its
+    /// own, and what `known` leaves open of all that the poses share.
     pub fn beyond(&self, known: &Estimate<'_>, i: usize, shift_mm: &Vector3<f64>) -> Option<f64> {
         let by_shared = known.normal.poses[i].as_ref()?.by_shared().fixed_rows::<3>(3).into_owned();
         let covariance = self.own_point_mm2(i)? + &by_shared * &known.covariance * by_shared.transpose();
@@ -172,8 +175,9 @@ impl Estimate<'_> {
     }
 }
 
-/// Leaves out the corners of a pose that miss their prediction by more than chance allows; `miss` is in standard deviations of their noise. A pose
-/// that misses the rig as a whole, as the usual one does with this [`Estimate::excess`], has no more outliers for it.
+/// Leaves out the corners of a pose that miss their prediction by more than chance allows; `miss` is in standard
+/// deviations of their noise. A pose that misses the rig as a whole, as the usual one does with this
+/// [`Estimate::excess`], has no more outliers for it.
 pub fn leave_outliers_out(view: &mut View, miss: impl Fn(&Observation) -> Option<f64>, excess: f64) {
     let misses: Vec<Option<f64>> = view.observations.iter().map(miss).collect();
     let whole = median(misses.iter().flatten().copied()).unwrap_or(0.0) / MEDIAN_MISS;
@@ -183,8 +187,8 @@ pub fn leave_outliers_out(view: &mut View, miss: impl Fn(&Observation) -> Option
     }
 }
 
-/// How much of each crossing's place, which are the shared unknowns from `first` on, its corners determine rather than what was known
-/// before, from none to one.
+/// How much of each crossing's place, which are the shared unknowns from `first` on, its corners determine rather than
+/// what was known before, from none to one.
 fn told_of_crossings(normal: &Normal, covariance: &DMatrix<f64>, first: usize) -> Vec<Vector3<f64>> {
     let told = covariance.component_mul(&normal.told.matrix).column_sum();
     told.as_slice()[first..]
@@ -212,8 +216,8 @@ fn residuals(
     bundle.views.par_iter().zip(&values.poses).map(of).collect()
 }
 
-/// What corners scatter here, but not less than at the calibration: what its lenses and its board left over is not the noise of pictures, and
-/// the target's crossings would be taken for it.
+/// What corners scatter here, but not less than at the calibration: what its lenses and its board left over is not the
+/// noise of pictures, and the target's crossings would be taken for it.
 fn at_least(usual: Option<Noise>, here: Noise) -> Noise {
     let added_px = usual.map_or(0.0, |usual| usual.added_px).max(here.added_px);
     Noise { added_px, ..here }
@@ -251,8 +255,9 @@ impl Bundle<'_> {
     }
 }
 
-/// Finds how far the crossings deviate in the plane and out of it, and how far the target as a whole is bent, everything else as linearised; with the covariance of the shared
-/// unknowns as the deviations were thought to be before.
+/// Finds how far the crossings deviate in the plane and out of it, and how far the target as a whole is bent,
+/// everything else as linearised; with the covariance of the shared unknowns as the deviations were thought to be
+/// before.
 fn settle_shape(
     bundle: &mut Bundle<'_>,
     values: &Values,

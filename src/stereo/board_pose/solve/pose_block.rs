@@ -1,8 +1,9 @@
 //! One pose's share of the normal equations of the bundle over all poses.
 //!
-//! In: a rig, the target's crossings, a pose and its corners. Out: the sums of products of derivatives by the rig's raw numbers, by the
-//! crossings' deviations and by the pose, then the same with the pose eliminated. A corner touches the rig, its own crossing and its own
-//! pose only, so that the crossings' part of a single pose is block diagonal; only what the poses' freedom takes off is dense.
+//! In: a rig, the target's crossings, a pose and its corners. Out: the sums of products of derivatives by the rig's raw
+//! numbers, by the crossings' deviations and by the pose, then the same with the pose eliminated. A corner touches the
+//! rig, its own crossing and its own pose only, so that the crossings' part of a single pose is block diagonal; only
+//! what the poses' freedom takes off is dense.
 
 use nalgebra::{DMatrix, Matrix3, Matrix3x6, Matrix6, Matrix6xX, Point3, SMatrix, SVector, Vector2, Vector3, Vector6};
 
@@ -45,12 +46,14 @@ impl<'a> Scene<'a> {
         self.crossings[self.board.index(o.col, o.row)]
     }
 
-    /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a corner behind its camera.
+    /// Predicted minus seen, px; what is seen of a misprinted crossing is in [`Observation::seen_off_mm`]. `None` for a
+    /// corner behind its camera.
     pub fn residual(&self, left_from_board: &Transform, o: &Observation) -> Option<Vector2<f64>> {
         of_point(&self.rig, left_from_board * (self.crossing(o) + o.seen_off_mm), o)
     }
 
-    /// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie behind its camera.
+    /// Hands over the rows of every active corner, with its side and its crossing's number. `None` where one would lie
+    /// behind its camera.
     fn each_corner(
         &self,
         left_from_board: &Transform,
@@ -162,7 +165,8 @@ impl PoseSums {
         }
     }
 
-    /// The step of the pose with everything else held, and by how much the cost would fall if the equations were straight.
+    /// The step of the pose with everything else held, and by how much the cost would fall if the equations were
+    /// straight.
     pub fn step(&self) -> Option<(Vector6<f64>, f64)> {
         let step = -(inverse6(&self.matrix)? * self.gradient);
         Some((step, -0.5 * step.dot(&self.gradient)))
@@ -219,8 +223,8 @@ impl PoseBlock {
         }
     }
 
-    /// With the pose eliminated, in the coordinates of the shared unknowns: `basis` maps the first of them to the rig's numbers, the
-    /// crossings' deviations follow. `None` where the corners do not determine the pose.
+    /// With the pose eliminated, in the coordinates of the shared unknowns: `basis` maps the first of them to the rig's
+    /// numbers, the crossings' deviations follow. `None` where the corners do not determine the pose.
     pub fn eliminate(&self, basis: &DMatrix<f64>) -> Option<Eliminated> {
         let (n, m) = (basis.ncols(), 3 * self.crossings_pose.len());
         let pose_inverse = inverse6(&self.pose.matrix)?;
@@ -278,9 +282,9 @@ impl Eliminated {
         -(self.pose_inverse * self.pose_gradient)
     }
 
-    /// Covariance of the pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to pose so much that each
-    /// tells it `excess` times as badly as its corners say; the whiteners hold that. What the target's size and the rays leave undetermined of the
-    /// scatter is the pose's.
+    /// Covariance of the pose, which is `pose_inverse` from its corners, where `right_from_left` scatters from pose to
+    /// pose so much that each tells it `excess` times as badly as its corners say; the whiteners hold that. What the
+    /// target's size and the rays leave undetermined of the scatter is the pose's.
     pub fn own_covariance(&self, excess: f64) -> Matrix6<f64> {
         let (own, by_change) = (&self.pose_inverse, self.by_change());
         let Some(change) = inverse6(&self.change).filter(|_| excess > 1.0) else { return *own };

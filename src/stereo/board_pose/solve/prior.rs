@@ -1,9 +1,10 @@
 //! What is known before the target is seen: the rig by its calibration, the target by its certificate.
 //!
-//! The rig's numbers are `calibrated + basis * u` with independent `u` of unit variance, so that a calibration with strongly dependent
-//! numbers stays well conditioned; further columns of the basis are changes that nothing is known about. The crossings deviate from
-//! their drawing by independent amounts in the plane and out of it; the board's frame is the drawing laid over the crossings by least
-//! squares, so that their deviations hold no shift, no turn and no tilt.
+//! The rig's numbers are `calibrated + basis * u` with independent `u` of unit variance, so that a calibration with
+//! strongly dependent numbers stays well conditioned; further columns of the basis are changes that nothing is known
+//! about. The crossings deviate from their drawing by independent amounts in the plane and out of it; the board's frame
+//! is the drawing laid over the crossings by least squares, so that their deviations hold no shift, no turn and no
+//! tilt.
 
 use nalgebra::{DMatrix, DVector, Point3, Vector3};
 
@@ -19,7 +20,8 @@ const HELD: f64 = 1e4;
 /// Share of a way of being bent that shift, tilts and the other ways must leave of it.
 const LEAST_OWN: f64 = 1e-6;
 
-/// How far black may have spread beyond what the corners' distances on the pictures say, mm, as a standard deviation: the pictures tell it.
+/// How far black may have spread beyond what the corners' distances on the pictures say, mm, as a standard deviation:
+/// the pictures tell it.
 const SPREAD_MM: f64 = 0.1;
 
 /// What the calibration says.
@@ -103,11 +105,13 @@ pub struct ShapePrior {
     pub out_of_plane_mm: f64,
     /// Of each way in which the target as a whole is bent, as the length of the vector of all deviations, mm.
     pub bent_mm: f64,
-    /// Of the common stretch, as the length of the vector of all deviations, mm; infinite where nothing is known of the size.
+    /// Of the common stretch, as the length of the vector of all deviations, mm; infinite where nothing is known of the
+    /// size.
     pub stretch_mm: f64,
 }
 
-/// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame takes up.
+/// Unit vectors in the space of all deviations (x, y, z of every crossing): shifts, turn and tilts, which the frame
+/// takes up.
 pub fn frame_modes(board: &Board) -> Vec<DVector<f64>> {
     type Way = fn(&Point3<f64>) -> Vector3<f64>;
     let ways: [Way; 6] = [

@@ -1,8 +1,8 @@
 //! Sums over all poses for what they share, with every pose eliminated.
 //!
-//! In: the poses' blocks. Out: the normal equations of the shared unknowns, and of the rig's raw numbers beside them. Method: blocks are made in
-//! parallel and summed in the order of the poses, so that the bytes do not depend on the threads; what the poses' freedom takes off is one
-//! product of large matrices for several poses at a time.
+//! In: the poses' blocks. Out: the normal equations of the shared unknowns, and of the rig's raw numbers beside them.
+//! Method: blocks are made in parallel and summed in the order of the poses, so that the bytes do not depend on the
+//! threads; what the poses' freedom takes off is one product of large matrices for several poses at a time.
 
 use nalgebra::{DMatrix, DMatrixViewMut, DVector};
 use rayon::prelude::*;
@@ -17,7 +17,8 @@ const AT_ONCE: usize = 16;
 struct SharedSums<'a> {
     basis: &'a DMatrix<f64>,
     corners: CornerSums,
-    /// What the poses' freedom takes off, by the rig's raw numbers and by the shared unknowns together; below the diagonal and on it.
+    /// What the poses' freedom takes off, by the rig's raw numbers and by the shared unknowns together; below the
+    /// diagonal and on it.
     taken: DMatrix<f64>,
     taken_gradient: DVector<f64>,
 }
@@ -40,8 +41,9 @@ pub struct Totals {
 const COLUMNS: usize = 48;
 
 impl Totals {
-    /// Adds up the blocks of `poses`, worked on in parallel and summed in their order; `each` gets every pose's parts, with its number. `basis` is
-    /// that of [`PoseBlock::eliminate`]. `None` where one has no block or its corners do not determine it.
+    /// Adds up the blocks of `poses`, worked on in parallel and summed in their order; `each` gets every pose's parts,
+    /// with its number. `basis` is that of [`PoseBlock::eliminate`]. `None` where one has no block or its corners do
+    /// not determine it.
     pub fn of<P: Sync>(
         poses: &[P],
         (basis, crossings): (&DMatrix<f64>, usize),

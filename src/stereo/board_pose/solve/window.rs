@@ -1,17 +1,17 @@
 //! What the window that a corner is measured in sees of the crossings about it.
 //!
-//! Edges run straight from crossing to crossing, so that they bend at one that is off, and a corner is measured by fitting straight edges
-//! over a window: over a part `h` of each edge it sees `1 - h/2` of the crossing's own deviation across that edge and `h/4` of each
-//! neighbour's (the means of `1 - |t|` and of `|t|` over the window). In: the windows' reach. Out: the shares, and by how much what is
-//! seen lies off the crossing itself.
+//! Edges run straight from crossing to crossing, so that they bend at one that is off, and a corner is measured by
+//! fitting straight edges over a window: over a part `h` of each edge it sees `1 - h/2` of the crossing's own deviation
+//! across that edge and `h/4` of each neighbour's (the means of `1 - |t|` and of `|t|` over the window). In: the
+//! windows' reach. Out: the shares, and by how much what is seen lies off the crossing itself.
 
 use nalgebra::{SVector, Vector2, Vector3};
 
 use crate::imaging::Board;
 use crate::stereo::data::{Observation, View, in_use};
 
-/// Which crossings' deviations a window sees of a coordinate, with their shares: the crossing's own first; `None` stands for a crossing
-/// at the board's rim.
+/// Which crossings' deviations a window sees of a coordinate, with their shares: the crossing's own first; `None`
+/// stands for a crossing at the board's rim.
 pub type SeenShares = [(Option<usize>, f64); 3];
 
 /// A window about a crossing.
@@ -58,8 +58,8 @@ impl<'a> Window<'a> {
         Vector3::new(of(0), of(1), 0.0)
     }
 
-    /// Variance that crossings at the board's rim, with a unit variance of their own, add to the deviation along x (0) or y (1) of the
-    /// crossing: those bend edges as the others do and are never seen.
+    /// Variance that crossings at the board's rim, with a unit variance of their own, add to the deviation along x (0)
+    /// or y (1) of the crossing: those bend edges as the others do and are never seen.
     pub fn rim_variance(&self, axis: usize) -> f64 {
         let shares = self.shares(axis);
         // What is seen of them is taken for the crossing's own deviation, of which less is seen.

@@ -1,9 +1,11 @@
 //! Whether the first or the last pairs of a series, which contradict the others, are of another rig.
 //!
-//! In: the rig of the others, and those pairs. Out: whether one other place of the right camera explains them. Method: each pair by itself tells that place,
-//! as well as its corners do and as far as the others scatter about theirs. That all have one in common is compared with one for each, the likelihood
-//! of either being that of places drawn as widely as makes it largest: two pairs that each were moved on their own are seldom met by the same six
-//! numbers where both tell them, and where they do not tell them that counts for nothing. Goes wrong: a board that moved alike in all of them.
+//! In: the rig of the others, and those pairs. Out: whether one other place of the right camera explains them. Method:
+//! each pair by itself tells that place, as well as its corners do and as far as the others scatter about theirs. That
+//! all have one in common is compared with one for each, the likelihood of either being that of places drawn as widely
+//! as makes it largest: two pairs that each were moved on their own are seldom met by the same six numbers where both
+//! tell them, and where they do not tell them that counts for nothing. Goes wrong: a board that moved alike in all of
+//! them.
 
 #[cfg(test)]
 mod tests;

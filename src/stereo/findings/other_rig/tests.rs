@@ -1,4 +1,5 @@
-//! Pairs whose pictures were not taken at one moment, and pairs of another rig: each is named where it is so, and neither where it is not.
+//! Pairs whose pictures were not taken at one moment, and pairs of another rig: each is named where it is so, and
+//! neither where it is not.
 
 use nalgebra::Vector3;
 
@@ -22,7 +23,8 @@ fn shown_by(mut corners: Corners, other: &World, seed: u64, pair: usize) -> Corn
     corners
 }
 
-/// Turns of the right camera before two pairs, deg; those of the second list contradict each other as much as the others.
+/// Turns of the right camera before two pairs, deg; those of the second list contradict each other as much as the
+/// others.
 const ALIKE_DEG: [[f64; 3]; 2] = [[0.7, 1.0, -0.6]; 2];
 const UNLIKE_DEG: [[f64; 3]; 2] = [[0.7, 1.0, -0.6], [-0.6, -0.9, 0.7]];
 

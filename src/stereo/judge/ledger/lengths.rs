@@ -1,5 +1,5 @@
-//! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on what residuals, rays and
-//! epipolar lines say of them.
+//! Lines on lengths: held out, anywhere in the volume, with other models, without some pairs, on a second board; and on
+//! what residuals, rays and epipolar lines say of them.
 
 use std::borrow::Cow;
 
@@ -46,7 +46,8 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
     Evidence { allows: extremes.verdict(case.facts.tolerance_mm), ..line }
 }
 
-/// What to do where the length that decides is uncertain, not wrong, and lies in a pair whose corners lie farther out than all others.
+/// What to do where the length that decides is uncertain, not wrong, and lies in a pair whose corners lie farther out
+/// than all others.
 fn beyond_others(case: &Case) -> Option<&'static str> {
     let worst = &case.facts.accuracy.extremes.largest;
     let uncertain_mm = worst.expanded_calibration_mm();
@@ -70,7 +71,8 @@ fn as_added(length: &LengthError) -> String {
 /// Name of the line on the tolerance itself.
 pub const TOLERANCE: &str = "tolerance";
 
-/// A tolerance that no rig can miss whose corners were counted rightly: an error of half a square puts a corner nearer to another one.
+/// A tolerance that no rig can miss whose corners were counted rightly: an error of half a square puts a corner nearer
+/// to another one.
 pub(super) fn tolerance(case: &Case) -> Option<Evidence> {
     let (tolerance_mm, half_mm) = (case.facts.tolerance_mm, 0.5 * case.calibration.board.square_mm);
     let remedy = "`--tolerance-mm` and `--square-mm` are in mm: see that both are";
@@ -103,7 +105,8 @@ pub(super) fn any_length(case: &Case) -> Evidence {
     Evidence::of_length("any length in the volume", remedy, value, case, detail)
 }
 
-/// What makes the length that is known least known better: pairs where it lies, unless what the corners at its ends scatter by is too much already.
+/// What makes the length that is known least known better: pairs where it lies, unless what the corners at its ends
+/// scatter by is too much already.
 fn surer(case: &Case, length: &VolumeLength) -> Cow<'static, str> {
     if COVERAGE * length.corners_mm > case.facts.tolerance_mm {
         return "what corners scatter by is more than the tolerance where lengths are least certain, and no more pairs change that: a flat board on a stand, \
@@ -126,8 +129,8 @@ fn unseen(case: &Case) -> String {
     })
 }
 
-/// What the calibration alone makes of lengths that no board showed: of a robot's way towards the cameras, over whose target the corners' noise averages
-/// out. Boards that hardly tilt fit rigs whose depths differ by a tenth.
+/// What the calibration alone makes of lengths that no board showed: of a robot's way towards the cameras, over whose
+/// target the corners' noise averages out. Boards that hardly tilt fit rigs whose depths differ by a tenth.
 pub(super) fn along_sight(case: &Case) -> Option<Evidence> {
     let Facts { volume, expansion, .. } = case.facts;
     let sigma_mm = volume.along_sight_mm.filter(|_| volume.extent == Extent::Boards)?;
@@ -161,7 +164,8 @@ pub(super) fn models(case: &Case) -> Evidence {
 pub(super) fn residuals(case: &Case) -> Evidence {
     let sigma_px = case.calibration.noise.typical_px(&case.calibration.views);
     let systematic_px = case.facts.residual_pattern.systematic_px(sigma_px);
-    // What both pictures see alike moves no point, but the rig that is fitted to it: the corners' whole scatter counts here.
+    // What both pictures see alike moves no point, but the rig that is fitted to it: the corners' whole scatter counts
+    // here.
     let share = case.facts.accuracy.disagreement_share().sqrt();
     let corners_mm = case.facts.volume.worst(|length| length.corners_mm / share).map(|(mm, _)| mm);
     let value = corners_mm.map(|mm| mm * systematic_px / sigma_px);
@@ -277,7 +281,8 @@ pub(super) fn second_board(case: &Case) -> Evidence {
         ),
         _ => String::new(),
     };
-    // A board that can be measured in half of its pairs only, or with rays that contradict each other, is no witness for a pass.
+    // A board that can be measured in half of its pairs only, or with rays that contradict each other, is no witness
+    // for a pass.
     let measured = second.pairs >= second.pairs_skipped.len() && second.doubtful.contradicted_share() <= 0.1;
     let own = extremes.verdict(case.facts.tolerance_mm);
     let allows = if measured { own } else { own.and(Verdict::Undecided) };

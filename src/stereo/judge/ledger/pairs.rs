@@ -1,4 +1,5 @@
-//! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses that were known.
+//! Lines on the pairs: what happened over them, how they scatter, which are missing, how the boards stood, and lenses
+//! that were known.
 
 use super::facts::Case;
 use crate::diagnostic::two_digits;
@@ -64,7 +65,8 @@ pub(super) fn pair_scatter(case: &Case) -> Evidence {
     }
 }
 
-/// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that stood before.
+/// Pairs with a board that do not fit the rig now standing: not those without a board, shown twice, or of a rig that
+/// stood before.
 pub(super) fn pairs_discarded(case: &Case) -> Evidence {
     /// Up to a third single pairs are wrong; beyond it what was kept may be the wrong choice.
     const LIMIT_PERCENT: f64 = 34.0;
@@ -107,7 +109,8 @@ pub(super) fn standing(case: &Case) -> Evidence {
 }
 
 pub(super) fn poses(case: &Case) -> Evidence {
-    /// With fewer, leaving out one loses a fifth or more of all that is known, and one wrong pair cannot be told from the others.
+    /// With fewer, leaving out one loses a fifth or more of all that is known, and one wrong pair cannot be told from
+    /// the others.
     const FEWEST: f64 = 6.0;
     /// Where the lenses are known, only where the cameras stand is left to be found.
     const FEWEST_OF_KNOWN: f64 = 3.0;
@@ -123,7 +126,8 @@ pub(super) fn poses(case: &Case) -> Evidence {
 }
 
 pub(super) fn tilts(case: &Case) -> Evidence {
-    /// Below, perspective hardly tells the focal length from the distance, and the lens model decides instead of the data.
+    /// Below, perspective hardly tells the focal length from the distance, and the lens model decides instead of the
+    /// data.
     const LEAST_DEG: f64 = 5.0;
     let [horizontal, vertical] = case.facts.coverage.tilts_deg;
     let value = horizontal.max(vertical);
@@ -137,10 +141,11 @@ pub(super) fn tilts(case: &Case) -> Evidence {
     Evidence::of_doubt(what, remedy, [value, LEAST_DEG], "deg", is_kept, detail)
 }
 
-/// A focal length that the pictures hardly tell, or that is none of a lens; lengths elsewhere than where the boards were are then anybody's guess.
+/// A focal length that the pictures hardly tell, or that is none of a lens; lengths elsewhere than where the boards
+/// were are then anybody's guess.
 pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
-    /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses that see wider than this
-    /// are calibrated with others.
+    /// From corner to corner, deg. What these lens models say of a ray grows beyond all bounds towards 180, and lenses
+    /// that see wider than this are calibrated with others.
     const WIDEST_DEG: f64 = 150.0;
     let Calibration { covariance, layout, .. } = case.calibration;
     let rig = case.calibration.rig();
@@ -167,7 +172,8 @@ pub(super) fn focal_lengths(case: &Case) -> Option<Evidence> {
     })
 }
 
-/// Cameras that stand nearer to each other than any are built: a board whose side is in other units makes a rig that is as consistent as any.
+/// Cameras that stand nearer to each other than any are built: a board whose side is in other units makes a rig that is
+/// as consistent as any.
 pub(super) fn baseline(case: &Case) -> Option<Evidence> {
     /// Endoscopes have 4 mm.
     const LEAST_MM: f64 = 3.0;
@@ -179,7 +185,8 @@ pub(super) fn baseline(case: &Case) -> Option<Evidence> {
     (baseline_mm < LEAST_MM).then(|| Evidence::of_doubt(what, remedy, figures, "mm apart", false, detail.to_owned()))
 }
 
-/// Lenses that were known from some of these very pairs: what those tell counts twice, and the uncertainty is too small.
+/// Lenses that were known from some of these very pairs: what those tell counts twice, and the uncertainty is too
+/// small.
 pub(super) fn lenses_of_these_pairs(case: &Case) -> Option<Evidence> {
     let pairs = case.facts.lens_pairs;
     let what = "lenses known from other pairs";

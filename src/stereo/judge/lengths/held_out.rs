@@ -1,8 +1,8 @@
 //! How far lengths on the board come out wrong, measured by cameras that have not seen the pair (Fig. 6 of the paper).
 //!
-//! In: a calibration. Out: the errors of every range, a pair and in all, and the largest of them. Method: k folds over the pairs; each
-//! fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets the scale, so that a wrong
-//! pitch is invisible here: only a second board shows it.
+//! In: a calibration. Out: the errors of every range, a pair and in all, and the largest of them. Method: k folds over
+//! the pairs; each fold's rig triangulates the corners of the pairs it was not calibrated with. The board's pitch sets
+//! the scale, so that a wrong pitch is invisible here: only a second board shows it.
 
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
@@ -52,15 +52,15 @@ pub struct HeldOutPair {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Accuracy {
     pub extremes: Extremes,
-    /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures disagree as
-    /// much as the corners scatter, less where both see the same deviations from the board.
+    /// Mean over all points of what both rays leave, chi-square with one degree of freedom: one where the pictures
+    /// disagree as much as the corners scatter, less where both see the same deviations from the board.
     pub rays_chi_square: f64,
     /// Distance of corners from the epipolar lines of their partners.
     pub epipolar: EpipolarError,
     pub doubtful: DoubtfulCorners,
     pub folds: usize,
-    /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what focal lengths usually are
-    /// helped to.
+    /// Pairs without which the others do not determine the cameras: no other rig measures them, or only one that what
+    /// focal lengths usually are helped to.
     pub unchecked: Vec<String>,
     /// What leaving out each fold does to the shared numbers.
     pub fold_steps: Vec<DVector<f64>>,
@@ -74,8 +74,8 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Share of the corners' variance by which both pictures disagree. The rest is the board's (its print, its bends, what of it moved with both
-    /// pictures), which both see alike: it moves no point.
+    /// Share of the corners' variance by which both pictures disagree. The rest is the board's (its print, its bends,
+    /// what of it moved with both pictures), which both see alike: it moves no point.
     pub fn disagreement_share(&self) -> f64 {
         self.rays_chi_square.clamp(f64::MIN_POSITIVE, 1.0)
     }
@@ -110,11 +110,12 @@ impl Folds {
     }
 }
 
-/// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded uncertainty of the board's lengths.
+/// Holds out every pair once, together with those of similar poses, and measures it. `board_mm` is the expanded
+/// uncertainty of the board's lengths.
 ///
-/// Pairs without which the others do not determine the cameras are not measured. Where that is all of them (a few boards that all lie alike), rigs
-/// measure them whose focal lengths are known no better than a calibration's must be, and all are told as unchecked; an error where there is
-/// not even one of those.
+/// Pairs without which the others do not determine the cameras are not measured. Where that is all of them (a few
+/// boards that all lie alike), rigs measure them whose focal lengths are known no better than a calibration's must be,
+/// and all are told as unchecked; an error where there is not even one of those.
 pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accuracy, Error> {
     let undetermined = || Error::undetermined().without(&calibration.skipped);
     if calibration.views.iter().all(|view| common(view).is_empty()) {
@@ -131,8 +132,8 @@ pub fn hold_out(calibration: &Calibration, board_mm: Option<f64>) -> Result<Accu
     summarise(calibration, folds, &measured, doubtful, board_mm).ok_or_else(undetermined)
 }
 
-/// An error where the distance of the cameras is not told from none: because they are one, or because boards that all lie alike leave focal
-/// lengths open and the distance with them, which is told once the lenses are known.
+/// An error where the distance of the cameras is not told from none: because they are one, or because boards that all
+/// lie alike leave focal lengths open and the distance with them, which is told once the lenses are known.
 fn check_baseline(calibration: &Calibration) -> Result<(), Error> {
     /// Standard deviations by which the distance must be more than nothing.
     const FEWEST: f64 = 3.0;
@@ -217,7 +218,8 @@ fn summarise(
     })
 }
 
-/// From the gap between two rays, as large as it looks from the left camera of the rig that measured it; doubtful corners are left out.
+/// From the gap between two rays, as large as it looks from the left camera of the rig that measured it; doubtful
+/// corners are left out.
 fn epipolar(folds: &Folds, measured: &[Measured]) -> Option<EpipolarError> {
     let misses = measured.iter().enumerate().filter_map(|(i, m)| {
         let Camera { fx, fy, .. } = folds.of(i)?.rig.left;

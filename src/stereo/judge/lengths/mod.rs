@@ -1,6 +1,7 @@
 //! Lengths between the corners of a board, triangulated by a rig.
 //!
-//! In: a rig and the corners of a pair. Out: signed length errors (measured minus nominal) of every range along the board's rows and columns.
+//! In: a rig and the corners of a pair. Out: signed length errors (measured minus nominal) of every range along the
+//! board's rows and columns.
 
 pub mod held_out;
 pub mod model_disagreement;
@@ -37,8 +38,8 @@ pub struct Range {
     pub max_abs_error_mm: f64,
 }
 
-/// A length between two corners in a row or column. On a grid of tags lengths of an odd number of lines begin with a tag: each number of lines is one
-/// length.
+/// A length between two corners in a row or column. On a grid of tags lengths of an odd number of lines begin with a
+/// tag: each number of lines is one length.
 pub(super) struct Length {
     axis: Axis,
     squares: usize,
@@ -94,8 +95,8 @@ pub(super) fn measure(rig: &Rig, board: &Board, view: &View) -> Measured {
     Measured { doubtful: vec![false; points.len()], points, sigmas_px, lengths }
 }
 
-/// The length errors that decide, each with its own uncertainty; `covariance_of` is that of the rig that measured a pair, `share` that of the
-/// corners' variance by which both pictures disagree.
+/// The length errors that decide, each with its own uncertainty; `covariance_of` is that of the rig that measured a
+/// pair, `share` that of the corners' variance by which both pictures disagree.
 pub(super) fn extremes<'a>(
     measured: &[Measured],
     covariance_of: impl Fn(usize) -> Option<&'a RigCovariance> + Sync,

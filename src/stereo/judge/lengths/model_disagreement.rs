@@ -1,10 +1,11 @@
 //! Models that measure other lengths than the chosen one, by more than chance.
 //!
-//! In: a calibration with the richer models that are witnesses (see [`crate::stereo::select::stated_uncertainty`]), lengths over the working
-//! volume. Out: for each by how much it changes lengths. A simpler model than the chosen one is either refuted by the corners or says the
-//! same. A richer one is less sure by nature: it disagrees only where its additional terms are more than chance. By how much
-//! chi-squared falls for them says so for all lengths at once: no length changes by more standard deviations of the difference of
-//! nested estimates, whose covariance is `V(richer) - V(simpler)` (Hausman 1978), than the root of that fall (Scheffe).
+//! In: a calibration with the richer models that are witnesses (see [`crate::stereo::select::stated_uncertainty`]),
+//! lengths over the working volume. Out: for each by how much it changes lengths. A simpler model than the chosen one
+//! is either refuted by the corners or says the same. A richer one is less sure by nature: it disagrees only where its
+//! additional terms are more than chance. By how much chi-squared falls for them says so for all lengths at once: no
+//! length changes by more standard deviations of the difference of nested estimates, whose covariance is `V(richer) -
+//! V(simpler)` (Hausman 1978), than the root of that fall (Scheffe).
 
 use serde::Serialize;
 

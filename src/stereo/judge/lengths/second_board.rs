@@ -1,7 +1,8 @@
 //! A second board, measured by the rig as it is.
 //!
-//! In: a calibration and the corners of a board that helped to calibrate nothing. Out: the errors of all its lengths that can be
-//! triangulated, and its scale. No pose is fitted and no miss is forgiven: a board that fits nothing is wrong, or the rig has moved.
+//! In: a calibration and the corners of a board that helped to calibrate nothing. Out: the errors of all its lengths
+//! that can be triangulated, and its scale. No pose is fitted and no miss is forgiven: a board that fits nothing is
+//! wrong, or the rig has moved.
 
 use serde::Serialize;
 
@@ -36,8 +37,8 @@ pub struct SecondBoard {
     pub ranges: Vec<Range>,
 }
 
-/// Measures a second board. `board_mm` is the expanded uncertainty of each board's lengths; the rig has its scale from the first, so that
-/// both count.
+/// Measures a second board. `board_mm` is the expanded uncertainty of each board's lengths; the rig has its scale from
+/// the first, so that both count.
 pub fn second_board(calibration: &Calibration, corners: &Corners, board_mm: Option<f64>) -> SecondBoard {
     let (rig, board) = (calibration.rig(), &corners.board);
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };

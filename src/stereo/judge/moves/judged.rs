@@ -30,7 +30,8 @@ pub struct KnownMove {
     pub corners_mm: [f64; 2],
     /// Measured over stated, minus one.
     pub scale_error: f64,
-    /// Standard deviation of that: the stated move, the measured one, and where on a board that turned the move was meant.
+    /// Standard deviation of that: the stated move, the measured one, and where on a board that turned the move was
+    /// meant.
     pub scale_sigma: f64,
     /// The side of a square with which the scale would be as the move says, mm.
     pub square_mm: f64,
@@ -48,7 +49,8 @@ impl KnownMove {
     pub(super) fn new(stated: &StatedMove, places: &Places, slide: &Slide) -> KnownMove {
         let length_mm = stated.length_mm;
         let scale_error = slide.length_mm / length_mm - 1.0;
-        // A move that is stated for any point of the board is off by any of these lengths: an even distribution (GUM, 4.3.7).
+        // A move that is stated for any point of the board is off by any of these lengths: an even distribution (GUM,
+        // 4.3.7).
         let where_mm = slide.half_range_mm() / 3.0_f64.sqrt();
         let sigma_mm = slide.sigma_mm.hypot(where_mm).hypot(stated.uncertainty_mm / COVERAGE);
         KnownMove {
@@ -118,8 +120,9 @@ impl KnownMove {
 }
 
 impl KnownMoves {
-    /// What explains moves that contradict the scale; empty where none does. A pitch of the board that is wrong is one scale of all lengths, a move
-    /// that is stated wrong by some mm shows less in a longer one; one move, or several of one length, do not tell.
+    /// What explains moves that contradict the scale; empty where none does. A pitch of the board that is wrong is one
+    /// scale of all lengths, a move that is stated wrong by some mm shows less in a longer one; one move, or several of
+    /// one length, do not tell.
     pub fn causes(&self) -> Vec<Cause> {
         if !self.measured.iter().any(KnownMove::contradicts) {
             return Vec::new();

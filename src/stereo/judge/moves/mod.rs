@@ -1,9 +1,10 @@
 //! Slides of the board by known lengths: the scale of the rig against something that is not the board.
 //!
-//! In: a calibration, and moves that are stated, each with its uncertainty and perhaps the pairs before and after. Out: how far the board moved as the
-//! rig measures it, the scale error, and what explains it. Method: the displacement of the board's middle between both poses, with the poses' own
-//! covariance and that of the rig which both share; the print moves with the board and cancels. Goes wrong: a board that also turns moves
-//! each corner by another length; how far these differ is part of the uncertainty.
+//! In: a calibration, and moves that are stated, each with its uncertainty and perhaps the pairs before and after. Out:
+//! how far the board moved as the rig measures it, the scale error, and what explains it. Method: the displacement of
+//! the board's middle between both poses, with the poses' own covariance and that of the rig which both share; the
+//! print moves with the board and cancels. Goes wrong: a board that also turns moves each corner by another length; how
+//! far these differ is part of the uncertainty.
 
 mod judged;
 mod slide;
@@ -19,11 +20,13 @@ use self::slide::{Places, Slide};
 use crate::stereo::Error;
 use crate::stereo::calibrate::Calibration;
 
-/// Where no pairs are named: how far the length may be off, and how much farther or less than the middle a corner may move, as shares of the
-/// length. Scales that can be mistaken are within it; boards that are placed anew by hand are not.
+/// Where no pairs are named: how far the length may be off, and how much farther or less than the middle a corner may
+/// move, as shares of the length. Scales that can be mistaken are within it; boards that are placed anew by hand are
+/// not.
 const NEAR: f64 = 0.1;
 
-/// Of named pairs: a board whose corners moved by so much more or less than its middle, as a share of the length, turned and did not slide.
+/// Of named pairs: a board whose corners moved by so much more or less than its middle, as a share of the length,
+/// turned and did not slide.
 const NO_SLIDE: f64 = 0.5;
 
 /// Moves that are listed where none fits.
@@ -38,8 +41,8 @@ pub fn check_names(stated: &[StatedMove], pairs: &[String]) -> Result<(), Error>
     }
 }
 
-/// Measures moves that are stated. An error where it is not settled which pairs are meant, or a move is stated twice; a pair that is there and
-/// was not used is said in the result.
+/// Measures moves that are stated. An error where it is not settled which pairs are meant, or a move is stated twice; a
+/// pair that is there and was not used is said in the result.
 pub fn measure(calibration: &Calibration, stated: &[StatedMove]) -> Result<KnownMoves, Error> {
     if stated.is_empty() {
         return Ok(KnownMoves::default());

@@ -57,7 +57,8 @@ impl<'a> Places<'a> {
         ends.map(|i| self.calibration.views[i].pair.clone())
     }
 
-    /// The move from one pair's board to another's. The covariance of both poses' small turns and shifts: their own, and what both owe to the rig.
+    /// The move from one pair's board to another's. The covariance of both poses' small turns and shifts: their own,
+    /// and what both owe to the rig.
     pub fn slide(&self, ends: [usize; 2]) -> Slide {
         let [from, to] = ends.map(|i| &self.calibration.values.poses[i]);
         let shift = to.translation.vector - from.translation.vector;

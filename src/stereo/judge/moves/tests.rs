@@ -18,7 +18,8 @@ use crate::stereo::synthetic::{self, World};
 
 const PAIRS: usize = 12;
 
-/// Twelve pairs, and boards that slid from the last one on by lengths (mm) and turned by angles (deg); pair 11 is before the first slide.
+/// Twelve pairs, and boards that slid from the last one on by lengths (mm) and turned by angles (deg); pair 11 is
+/// before the first slide.
 fn slid(seed: u64, steps: &[(f64, f64)]) -> World {
     let mut world = World { sigma_px: 0.02, ..World::new(PAIRS, seed) };
     let along = Vector3::new(0.8, -0.5, 0.33).normalize();

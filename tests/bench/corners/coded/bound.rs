@@ -1,8 +1,9 @@
 //! The Cramer-Rao bound of a corner beside markers: of the pixels that are nearer to its edges than to anything else.
 //!
-//! In: a picture's case and a corner. Out: the least covariance that any unbiased fit has of a place whose edges' directions and blurs, grey levels and
-//! gradient of the light are not known (how the edges bend is), from pixels three blurs away from the next edges and from the markers, as far on
-//! either side as the nearer neighbour. Photon noise, read noise and rounding as the renderer makes them.
+//! In: a picture's case and a corner. Out: the least covariance that any unbiased fit has of a place whose edges'
+//! directions and blurs, grey levels and gradient of the light are not known (how the edges bend is), from pixels three
+//! blurs away from the next edges and from the markers, as far on either side as the nearer neighbour. Photon noise,
+//! read noise and rounding as the renderer makes them.
 
 use nalgebra::{Matrix2, Point2, SMatrix, SVector, Vector2};
 use statrs::function::erf::erf;

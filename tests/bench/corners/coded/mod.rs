@@ -1,8 +1,11 @@
-//! Boards with markers and grids of tags, seen in part: whether any corner has another's number, and how well and how surely the corners lie.
+//! Boards with markers and grids of tags, seen in part: whether any corner has another's number, and how well and how
+//! surely the corners lie.
 //!
-//! Every dictionary, markers of 0.6 to 0.8 of a square, or every family of tags, gaps of 0.2 to 0.4 of a tag; tilts to 60 degrees, blur to 2.5 px, noise to 5 grey levels, squares of 12 to 100 px, from the
-//! whole board down to a tenth of it. `-- coded FIRST COUNT` (of grids of tags `-- tags FIRST COUNT`, of OpenCV's `-- grid FIRST COUNT`) takes the pictures from one number on, so that parts of a long run add up; with a
-//! folder behind that the pictures are written there with truth and findings, for `scripts/peers_coded.py`.
+//! Every dictionary, markers of 0.6 to 0.8 of a square, or every family of tags, gaps of 0.2 to 0.4 of a tag; tilts to
+//! 60 degrees, blur to 2.5 px, noise to 5 grey levels, squares of 12 to 100 px, from the whole board down to a tenth of
+//! it. `-- coded FIRST COUNT` (of grids of tags `-- tags FIRST COUNT`, of OpenCV's `-- grid FIRST COUNT`) takes the
+//! pictures from one number on, so that parts of a long run add up; with a folder behind that the pictures are written
+//! there with truth and findings, for `scripts/peers_coded.py`.
 
 mod bound;
 mod case;
@@ -86,7 +89,8 @@ fn look(kind: Coded, number: usize, folder: Option<&Path>) -> Outcome {
     }
 }
 
-/// The picture, and a table of id, true place, place found (empty where it was not), whether it has a margin, and its squared deviation in sigmas.
+/// The picture, and a table of id, true place, place found (empty where it was not), whether it has a margin, and its
+/// squared deviation in sigmas.
 fn write(
     folder: &Path,
     name: &str,

@@ -14,8 +14,8 @@ const FALSE_PASS: f64 = 1.1;
 /// A rig is wrong where it is off by so many of its own standard deviations.
 const SIGMAS: f64 = 5.0;
 
-/// Lengths that are off by less are no harm, mm: the certificate of the presets' board leaves as much open, corner by corner the same in
-/// all pairs, and no picture of that board shows it.
+/// Lengths that are off by less are no harm, mm: the certificate of the presets' board leaves as much open, corner by
+/// corner the same in all pairs, and no picture of that board shows it.
 const CERTIFICATE_MM: f64 = 0.004;
 
 /// What came of it.

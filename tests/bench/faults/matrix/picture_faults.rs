@@ -1,6 +1,8 @@
-//! What happens to a picture between the lens and the file: defects of the sensor, stray light, electronics, formats, people.
+//! What happens to a picture between the lens and the file: defects of the sensor, stray light, electronics, formats,
+//! people.
 //!
-//! In: the sensor's numbers as shares of its range. Out: a file. Everything works on numbers finer than the file's, which are rounded once.
+//! In: the sensor's numbers as shares of its range. Out: a file. Everything works on numbers finer than the file's,
+//! which are rounded once.
 
 use image::codecs::jpeg::JpegEncoder;
 use image::{ExtendedColorType, ImageEncoder};
@@ -62,7 +64,8 @@ pub enum PictureFault {
     Gamma(f32),
     /// Everything above a level reads as that level.
     ClipAt(f32),
-    /// An unsharp mask, as cameras sharpen: what a Gaussian blur takes away is added once more, and clipped at the ends of the range.
+    /// An unsharp mask, as cameras sharpen: what a Gaussian blur takes away is added once more, and clipped at the ends
+    /// of the range.
     #[allow(dead_code, reason = "only the tests of corners plant it")]
     Sharpened {
         /// How much of it.

@@ -33,7 +33,8 @@ pub fn cases() -> Vec<Case> {
             with_second(seed, px, board(squares, mm), 1.0, still)
         }));
     }
-    // The larger its pitch in truth, the smaller the rig's scale by it: the rig's own board may be the wrong one, so no pass.
+    // The larger its pitch in truth, the smaller the rig's scale by it: the rig's own board may be the wrong one, so no
+    // pass.
     for percent in [0.05, 0.2, 0.5, 1.0, 5.0] {
         list.push(Case {
             right: Right::Truth,

@@ -1,4 +1,5 @@
-//! A series of check pictures of which every one can be changed: another rig, board, place or light, and faults of its own.
+//! A series of check pictures of which every one can be changed: another rig, board, place or light, and faults of its
+//! own.
 //!
 //! [`series`] draws a faultless one; a fault is planted by changing fields of the [`Exposure`]s concerned.
 

@@ -1,7 +1,7 @@
 //! How far a written rig is from the true one, in figures that a user has: lengths and points of fresh boards.
 //!
-//! The true rig projects a fresh board's corners, the written rig triangulates them. Everything from `calibration.json` on is code of
-//! its own here: nothing is shared with what is being judged.
+//! The true rig projects a fresh board's corners, the written rig triangulates them. Everything from `calibration.json`
+//! on is code of its own here: nothing is shared with what is being judged.
 
 use nalgebra::{Matrix3, Point2, Point3, Rotation3, Vector2, Vector3};
 use serde_json::Value;
@@ -121,7 +121,8 @@ impl Written {
         Some(Written { eyes: [Eye::read(&json["left"])?, Eye::read(&json["right"])?], rotation, translation })
     }
 
-    /// The same with one parameter of the covariance's names changed; the board's own move no ray. `None` for a name that is neither.
+    /// The same with one parameter of the covariance's names changed; the board's own move no ray. `None` for a name
+    /// that is neither.
     fn changed(&self, name: &str, by: f64) -> Option<Written> {
         let mut rig = self.clone();
         let (group, parameter) = name.split_once('.')?;
@@ -304,7 +305,8 @@ fn pictures(set: &Set, point: &Point3<f64>) -> [Point2<f64>; 2] {
         .map(|(px, side, camera)| set.maps[side](px, f64::from(camera.width), f64::from(camera.height)))
 }
 
-/// Pairs of rigs one standard deviation to either side along the eigenvectors of the written covariance, if there is one.
+/// Pairs of rigs one standard deviation to either side along the eigenvectors of the written covariance, if there is
+/// one.
 fn deviated(calibration: &Value, written: &Written) -> Option<Vec<(Written, Written)>> {
     let order: Vec<&str> = calibration["covariance"]["order"].as_array()?.iter().filter_map(Value::as_str).collect();
     let rows = calibration["covariance"]["matrix"].as_array()?;

@@ -1,4 +1,5 @@
-//! Views that tell little: parallel boards, small tilts, few pairs, the same pair again, boards partly out of the picture.
+//! Views that tell little: parallel boards, small tilts, few pairs, the same pair again, boards partly out of the
+//! picture.
 
 use stereocal::simulate::check_poses::Holding;
 

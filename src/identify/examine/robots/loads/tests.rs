@@ -12,8 +12,9 @@ use crate::robot::corrections::GravityTerm;
 
 const NOISE_MM: f64 = 0.03;
 
-/// Points all round a robot whose links are off, as many as `loaded` has: under a load its joints turn by so much a metre of the load's lever, the
-/// outer ones by more; `lacking` is an error of the gears that links do not describe, deg.
+/// Points all round a robot whose links are off, as many as `loaded` has: under a load its joints turn by so much a
+/// metre of the load's lever, the outer ones by more; `lacking` is an error of the gears that links do not describe,
+/// deg.
 fn table(loaded: &[bool], k_rad_per_m: f64, lacking_deg: f64, seed: u64) -> (Dataset, Robot) {
     let world = planned(0, 0, 25.0, NOISE_MM, seed, &|_| {});
     let mut random = Pcg64Mcg::seed_from_u64(100 + seed);

@@ -1,4 +1,5 @@
-//! Whether the 95 % intervals of lengths hold where the series is not as the model has it: for the rig at the moment that the ledger names.
+//! Whether the 95 % intervals of lengths hold where the series is not as the model has it: for the rig at the moment
+//! that the ledger names.
 
 use std::path::Path;
 
@@ -96,7 +97,8 @@ fn bowed(set: &mut Set, um: f64) {
     set.pairs.iter_mut().flat_map(|pair| &mut pair.sides).for_each(|side| side.board = board.clone());
 }
 
-/// The set with the rig of the moment that is named: between two pairs of the series; that of the last pair where nothing is said.
+/// The set with the rig of the moment that is named: between two pairs of the series; that of the last pair where
+/// nothing is said.
 fn at_moment(set: Set, said: &Said, drifts: bool) -> Set {
     let named = |k: usize| {
         let name = said.check.as_ref()?["moment"][k].as_str()?.to_owned();

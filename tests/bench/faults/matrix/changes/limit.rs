@@ -1,5 +1,5 @@
-//! From which size on a fault can be seen: the gain of chi-squared that it brings at the minimum of the faultless set, every shared number
-//! and pose solved again, against what chance brings.
+//! From which size on a fault can be seen: the gain of chi-squared that it brings at the minimum of the faultless set,
+//! every shared number and pose solved again, against what chance brings.
 
 use super::super::series::ExposedPair;
 use nalgebra::{DMatrix, DVector};

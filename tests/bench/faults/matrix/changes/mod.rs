@@ -1,8 +1,9 @@
-//! Rigs that change while they are photographed, planted in corners: is the reason that is given the right one, what does it cost, and
-//! do the intervals hold.
+//! Rigs that change while they are photographed, planted in corners: is the reason that is given the right one, what
+//! does it cost, and do the intervals hold.
 //!
-//! A run is a set of check pictures of which only the corners are made, with noise, and `camera-check --corners` on them, so that
-//! hundreds cost minutes. The detection limit of a fault follows from the normal equations of the faultless set.
+//! A run is a set of check pictures of which only the corners are made, with noise, and `camera-check --corners` on
+//! them, so that hundreds cost minutes. The detection limit of a fault follows from the normal equations of the
+//! faultless set.
 
 pub mod corners;
 pub mod intervals;

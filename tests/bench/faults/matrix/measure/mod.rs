@@ -1,4 +1,5 @@
-//! Planted faults of `measure`: a rig that is no longer the calibrated one, a target that is not the typed one, bad poses.
+//! Planted faults of `measure`: a rig that is no longer the calibrated one, a target that is not the typed one, bad
+//! poses.
 
 pub mod judge;
 pub mod pose_faults;
