@@ -33,7 +33,6 @@ use crate::stereo::findings::hypothesis::Hypothesis;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
-use crate::stereo::solve::Problem;
 use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Chance that a series in which nothing happened has a finding, all looks together.
@@ -191,7 +190,7 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     let by_pair = pattern.by_pair.as_slice();
     let candidates = Candidate::all(&linear, &hypotheses, calibration, by_pair, pattern.kind == Kind::Step);
     let equals = likeliest(&candidates, count);
-    let other = without_one(&problem, &linear, &hypotheses, calibration, &pattern, &equals);
+    let other = without_one(&linear, &hypotheses, calibration, &pattern, &equals);
     finding(calibration, lengths, &equals, &pattern, other)
 }
 
@@ -202,34 +201,26 @@ struct WithoutOne {
     causes: Vec<Cause>,
 }
 
-/// The first pair that alone decides what a change is: without it the likeliest cause is none of these. The pair that
-/// misses the rig most is taken out of the bundle itself, too: with it goes what it adds to the scatter that the others
-/// are weighed by, which the linear problem does not see.
+/// The first pair that alone decides what a change is: without it the likeliest cause is none of these.
 fn without_one(
-    problem: &Problem,
     linear: &Linear,
     hypotheses: &[Hypothesis],
     calibration: &Calibration,
     pattern: &Pattern,
     equals: &[&Candidate],
 ) -> Option<WithoutOne> {
-    let otherwise = |pair: usize, others: &Linear| {
+    let without = |pair: usize| {
+        let others = linear.without(pair)?;
         let shares = pattern.by_pair.iter().enumerate().filter(|(i, _)| *i != pair);
         let by_pair: Vec<f64> = shares.map(|(_, share)| *share).collect();
-        let candidates = Candidate::all(others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
+        let candidates = Candidate::all(&others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
         let now = likeliest(&candidates, others.pairs());
         let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
         let first = *causes.first()?;
         let is_other = equals.iter().all(|candidate| candidate.cause() != first);
         is_other.then(|| WithoutOne { pair: calibration.views[pair].pair.clone(), words: described(&now), causes })
     };
-    let without = |pair: usize| otherwise(pair, &linear.without(pair)?);
-    let first = (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next();
-    first.or_else(|| {
-        let worst = problem.worst_pair()?;
-        let solved = problem.without(worst).solve_near(&calibration.layout).ok()?;
-        otherwise(worst, &Linear::new(&solved.problem, &calibration.layout)?)
-    })
+    (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next()
 }
 
 /// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause

@@ -241,7 +241,9 @@ mod tests {
         let (problem, layout) = (found.problem(), found.layout);
         let yaw = [turned(&layout, found.rig(), Vector3::y())];
         let by_pair: Vec<f64> = (0..9).map(|i| f64::from(i >= 5)).collect();
-        let mut others = problem.without(7);
+        let mut others = problem.clone();
+        others.views.remove(7);
+        others.values.poses.remove(7);
         others.values = others.refit(&layout).unwrap();
         let linear = Linear::new(&problem, &layout).unwrap();
         let [left_out, by_themselves] = [linear.without(7).unwrap(), Linear::new(&others, &layout).unwrap()]

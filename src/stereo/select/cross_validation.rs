@@ -149,7 +149,10 @@ mod tests {
             let all = leave_out(&equations, &equations, &layout, &found.values.shared, &fold_of, WORST_FOCAL_SIGMA);
             for (fold, without) in all.iter().enumerate() {
                 let without = without.as_ref().unwrap();
-                let searched = problem.without(fold).refit(&layout).unwrap();
+                let mut others = found.problem();
+                others.views.remove(fold);
+                others.values.poses.remove(fold);
+                let searched = others.refit(&layout).unwrap();
                 let (step, search) = (layout.numbers(&without.shared), layout.numbers(&searched.shared));
                 for (i, name) in layout.names().iter().enumerate() {
                     let sigma = without.covariance[(i, i)].sqrt();

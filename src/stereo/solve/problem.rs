@@ -87,24 +87,6 @@ impl Problem {
         solve(forced.unwrap_or(true)).or_else(|_| solve(forced.unwrap_or(false)))
     }
 
-    /// The pair whose corners miss the rig most, by the root mean square of their residuals in px.
-    pub fn worst_pair(&self) -> Option<usize> {
-        let missed = |view, pose| {
-            let of_view = residuals::of_view(&self.values.shared, view, pose);
-            residuals::root_mean_square(of_view.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0)
-        };
-        let by_pair = self.views.iter().zip(&self.values.poses).map(|(view, pose)| missed(view, pose));
-        by_pair.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(pair, _)| pair)
-    }
-
-    /// The same without a pair.
-    pub fn without(&self, pair: usize) -> Problem {
-        let mut others = self.clone();
-        others.views.remove(pair);
-        others.values.poses.remove(pair);
-        others
-    }
-
     /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one
     /// lies behind its camera.
     pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
