@@ -3,8 +3,8 @@
 //!
 //! In: the commanded angles. Out: the small angle that is added to each of them, and how far each joint's bearing
 //! tilts. Sag of joint j is its compliance times the torque of unit weights at origins of the chain and at the tool
-//! about its axis, on the robot's own chain without corrections; the periodic errors are `a sin q + b cos q + c sin 2q
-//! + d cos 2q`; a coupling is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
+//! about its axis, on the robot's own chain without corrections; the periodic errors are
+//! `a sin q + b cos q + c sin 2q + d cos 2q`; a coupling is a ratio times the angle of another joint, or of the joint itself (an error of its scale).
 //! Bending is what a bearing and the link before it yield across the joint's axis: a tilt about x and y of the link
 //! (added to its alpha and beta) by the torque about these, with one compliance a joint. Wobble is the same tilt by the
 //! joint's own angle: `(cos q, -sin q)` and `(sin q, cos q)` about x and y, an oval bearing; the tilt that turns with

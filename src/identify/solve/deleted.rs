@@ -60,6 +60,11 @@ pub struct Deleted {
 }
 
 impl Deleted {
+    /// Degrees of freedom of all rows, of those of the fit.
+    pub fn freedom_of_all(&self) -> f64 {
+        self.freedom + self.numbers as f64
+    }
+
     /// In standard deviations of the others, as of one normal number.
     fn size(&self) -> f64 {
         let square = self.square / self.variance.max(f64::MIN_POSITIVE);
