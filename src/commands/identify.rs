@@ -41,7 +41,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
-    let (out, Measured { record, stale }) = open(args, &out, run, &source.paths(), file.as_deref())?;
+    let (out, Measured { record, doubts: of_points }) = open(args, &out, run, &source.paths(), file.as_deref())?;
     if let Some(record) = &record {
         shared::take(record, &mut set);
     }
@@ -60,7 +60,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     bar.finish_and_clear();
     let of_fit = record::findings::findings(&set, &found, &along);
     let mut findings = Findings::new(findings, (against, unexplained), of_fit, &along, &set, &found);
-    findings.doubts.splice(0..0, stale);
+    findings.doubts.splice(0..0, of_points);
     let mut record = Record::new(&set, &nominal, &found, &along, findings, &settings, args.seed);
     record.warnings.extend(not_run.clone());
     record.not_run = not_run;
@@ -182,8 +182,8 @@ fn as_mended(set: &Dataset) -> impl Iterator<Item = (Role, Vec<f64>, [f64; 3])> 
 struct Measured {
     /// The `measure.json` that is about them.
     record: Option<Utf8PathBuf>,
-    /// That the rig beside them was calibrated again since.
-    stale: Option<Finding>,
+    /// What speaks against them: that the rig beside them was calibrated again since, or what `measure` said of them.
+    doubts: Vec<Finding>,
 }
 
 /// The results folder, once nothing is in the way of what will be written, and what stands beside the measurements.
@@ -212,7 +212,7 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Measured {
     let record = folder.join("measure.json");
     // Without provenance nothing says that they belong together but what they hold.
     let Some(measured_by) = Provenance::of_json(&record) else {
-        return Measured { record: Some(record), stale: None };
+        return Measured { doubts: doubted(&record).into_iter().collect(), record: Some(record) };
     };
     let csv = Digested::read(measurements);
     if !csv.is_some_and(|csv| measured_by.outputs.iter().any(|output| output.sha256 == csv.sha256)) {
@@ -226,7 +226,15 @@ fn check_calibration(out: &OutDir, measurements: &Utf8Path) -> Measured {
         Finding::new(said, "run `stereocal measure` again")
     });
     out.measured_by(measured_by);
-    Measured { record: Some(record), stale }
+    Measured { doubts: stale.into_iter().chain(doubted(&record)).collect(), record: Some(record) }
+}
+
+/// What a `measure.json` says against its own points.
+fn doubted(record: &Utf8Path) -> Option<Finding> {
+    let said: serde_json::Value = serde_json::from_slice(&std::fs::read(record).ok()?).ok()?;
+    let doubt = said["rig"]["doubt"].as_str()?;
+    let act = "measure the squares of both boards, and run again what was told another size";
+    Some(Finding::new(format!("{doubt} (`measure`, {record})"), act))
 }
 
 /// The robot file that is named, or `robot.toml` in the working directory where it is there.

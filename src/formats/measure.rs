@@ -11,7 +11,6 @@ use crate::imaging::{Board, Corners};
 use crate::linear_algebra::rows;
 use crate::measurements::{pose_fields, pose_header, quoted};
 use crate::statistics::median;
-use crate::stereo::Rig;
 use crate::stereo::board_pose::rig_change::cause::Explanation;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, Shared, TargetPose};
@@ -90,7 +89,7 @@ impl MeasureFile {
             square_mm: board.square_mm,
             poses: series.poses.len(),
             measured: targets.len(),
-            rig: rig_record(series, board, rig),
+            rig: rig_record(series, known),
             chi_square: series.chi_square,
             corner_noise_px: series.noise_px,
             calibration_noise_px: series.usual_px,
@@ -108,7 +107,8 @@ impl MeasureFile {
     }
 }
 
-fn rig_record(series: &Series, board: &Board, rig: &Rig) -> Value {
+fn rig_record(series: &Series, known: &Knowledge) -> Value {
+    let (board, rig) = (&known.board, &known.rig);
     let (state, changes, moved_before) = match &series.judgement {
         Judgement::Agrees => ("agrees", &[][..], None),
         Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
@@ -124,6 +124,8 @@ fn rig_record(series: &Series, board: &Board, rig: &Rig) -> Value {
     json!({
         "state": state,
         "statement": series.judgement.describe(rig, board),
+        // What whoever uses the points has to know.
+        "doubt": series.judgement.doubt(rig, board, known.tolerance_mm),
         // Of the calibration and of the target's size.
         "chi_square": series.prior_chi_square.map(|c| c[0]),
         "degrees_of_freedom": series.prior_chi_square.map(|c| c[1]),

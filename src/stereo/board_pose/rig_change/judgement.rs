@@ -69,8 +69,8 @@ impl Judgement {
                 causes(changed, rig, board),
                 changed.moves_mm,
                 changed.scaled_mm.map_or(String::new(), |mm| format!(
-                    "; but if the target is as was said, the rig is scaled and the points are off by {mm:.3} mm: measure the target's squares, and \
-                     give them by `--square-mm`"
+                    "; but if the target is as was said, the rig is scaled and the points are off by {mm:.3} mm: measure the squares of both \
+                     boards; the target's go to `--square-mm`, the check board's to `camera-check IMAGES --square-mm MM`"
                 ))
             ),
             Judgement::Contradicts(changed) => format!(
@@ -107,6 +107,19 @@ impl Judgement {
                  the rig or of the target explains that"
             ),
         })
+    }
+
+    /// What speaks against points that are given for all that, for whoever uses them: where they may be off by more than
+    /// this, mm.
+    pub fn doubt(&self, rig: &Rig, board: &Board, tolerance_mm: f64) -> Option<String> {
+        match self {
+            Judgement::Allowed(changed) if self.leaves_open(tolerance_mm) => Some(format!(
+                "the points are off by {:.3} mm if the target is as was said: {}",
+                changed.scaled_mm?,
+                causes(changed, rig, board)
+            )),
+            _ => None,
+        }
     }
 
     pub fn hint(&self, rig: &Rig) -> Option<&'static str> {
