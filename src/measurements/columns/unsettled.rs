@@ -191,5 +191,8 @@ pub(in crate::measurements) fn no_unit(parts: &[Part], joints: Option<Unit>, len
     let lengths = either(lengths, [Unit::Mm, Unit::M]);
     let of_joints = |joints: Unit| lengths.iter().map(move |l| format!("`--units {},{}`", joints.flag(), l.flag()));
     let flags: Vec<String> = either(joints, [Unit::Deg, Unit::Rad]).into_iter().flat_map(of_joints).collect();
-    parts[0].refuse(message, Some(&format!("{} says it", flags.join(" or "))))
+    parts[0].refuse(
+        message,
+        Some(&format!("{} says it; look at `--robot`, too: its file must be of this robot", flags.join(" or "))),
+    )
 }
