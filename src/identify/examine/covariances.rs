@@ -26,7 +26,7 @@ use crate::statistics::median;
 /// Standard deviations that are off by so many times are worth a sentence.
 const OFF: f64 = 1.6;
 
-/// Logarithm of the evidence that it takes.
+/// Logarithm of the evidence that it takes, beside what so many looks cost: at each group, in both directions.
 const CLEAR: f64 = 4.0;
 
 /// Fewest groups among which one can be told from the others.
@@ -173,7 +173,8 @@ fn worst(groups: &[Seen]) -> Option<Off> {
         let own_scatter_mm2 = usual_mm2 - common * g.stated_mm2;
         let factor = ((g.seen_mm2 - own_scatter_mm2) / (common * g.stated_mm2)).max(LEAST);
         let evidence = together - others - alone;
-        (times.max(1.0 / times) > OFF && evidence > CLEAR).then(|| Off {
+        let looks = 2.0 * groups.len() as f64;
+        (times.max(1.0 / times) > OFF && evidence > CLEAR + looks.ln()).then(|| Off {
             name: g.name.clone(),
             times,
             factor,
