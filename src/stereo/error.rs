@@ -31,6 +31,43 @@ impl OneSide {
     }
 }
 
+/// From where on the pictures of one side are shifted against the other's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ShiftedFrom {
+    /// The first pair whose pictures do not belong together, or belong together again.
+    pub pair: String,
+    /// By how many pictures.
+    pub by: usize,
+    /// The first left picture from there on that has a partner, and its partner.
+    pub partners: [String; 2],
+    /// The camera that lost pictures there, and how many.
+    pub lost: (Side, usize),
+    /// The other side's pictures between the last pair before and the first one after: so many of them have no partner.
+    pub alone: Vec<String>,
+}
+
+impl ShiftedFrom {
+    fn words(&self) -> String {
+        let Self { pair, by, partners: [left, right], lost: (side, count), alone } = self;
+        let shift = match by {
+            0 => "the pictures of equal names belong together again".to_owned(),
+            1 => format!("by 1 picture: left picture {left} and right picture {right} are one pair"),
+            _ => format!("by {by} pictures: left picture {left} and right picture {right} are one pair"),
+        };
+        let (other, side) = (side.other().name(), side.name());
+        let alone_are = named(alone);
+        let without = match (count, alone.len()) {
+            (1, 1) => format!("{other} picture {alone_are} has no partner, the {side} one seems lost"),
+            (n, of) if *n == of => format!("{other} pictures {alone_are} have no partner, the {side} ones seem lost"),
+            (1, _) => format!("one of the {other} pictures {alone_are} has no partner, the {side} one seems lost"),
+            (n, _) => {
+                format!("{n} of the {other} pictures {alone_are} have no partner, the {side} ones seem lost")
+            }
+        };
+        format!("\n  from pair {pair} on, {shift}; {without}")
+    }
+}
+
 /// What can go wrong between corners and points.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -110,17 +147,20 @@ pub enum Error {
     /// The pictures of one side belong to those of the other side that come some pairs before or after.
     #[error(
         "the pictures of one side are shifted against the other's: with left picture {left} and right picture {right} as one pair, and so \
-         on, {fit} of {of} pairs fit one rig, and as they are named they do not"
+         on, {fit} of {of} pairs fit one rig, and as they are named they do not{}",
+        from.iter().map(ShiftedFrom::words).collect::<String>()
     )]
     Shifted {
         /// Pairs that fit one rig then.
         fit: usize,
         /// Pairs there are then.
         of: usize,
-        /// The first left picture that has a partner.
+        /// The first left picture that has a partner of another name.
         left: String,
         /// Its partner.
         right: String,
+        /// Where pictures were lost; none where the shift is the same over all pairs.
+        from: Vec<ShiftedFrom>,
     },
     /// All pictures of one side were changed on their way from the camera.
     #[error(

@@ -40,7 +40,9 @@ pub struct Asked {
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let fitting = |corners: &Corners| standing(corners, asked).ok().map(|(found, _)| found.views.len());
-    let (mut found, mut told) = standing(corners, asked).map_err(|error| one_side::explain(error, corners, fitting))?;
+    let known = asked.options.known.as_ref();
+    let explain = |error| one_side::explain(error, corners, known, fitting);
+    let (mut found, mut told) = standing(corners, asked).map_err(explain)?;
     let of_rig = |found: &Calibration| lengths(found, asked.extent);
     let with_own = own_lenses::instead_of_contradicted(&found);
     let asked_of = with_own.as_ref().unwrap_or(&found);

@@ -7,6 +7,7 @@ mod moved;
 pub mod numbering;
 pub mod open_numbers;
 pub mod series;
+pub mod shifts;
 
 use crate::stereo::model::KnownLenses;
 

@@ -66,7 +66,7 @@ pub fn agreed(
 
 /// How far two rigs are apart: the angle between the rotations plus the distance of the translations in units of the
 /// boards' distance.
-fn deviation(a: &Transform, b: &Transform, distance_mm: f64) -> f64 {
+pub(super) fn deviation(a: &Transform, b: &Transform, distance_mm: f64) -> f64 {
     rotation_vector(&(a.inverse() * b)).norm()
         + (a.translation.vector - b.translation.vector).norm() / distance_mm.max(f64::MIN_POSITIVE)
 }

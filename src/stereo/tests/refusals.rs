@@ -73,7 +73,7 @@ fn a_series_that_is_shifted_against_the_other_side_is_named() {
     for by in [1, 8] {
         let corners = shifted(world.corners(14), by);
         match calibrate_standing(&corners, &asked()) {
-            Err(Error::Shifted { fit, of, left, right }) => {
+            Err(Error::Shifted { fit, of, left, right, .. }) => {
                 let (left, right): (usize, usize) = (left.parse().unwrap(), right.parse().unwrap());
                 // The rights were moved to the front by so many, or to the back by what is left of the ten.
                 assert!(
@@ -95,7 +95,7 @@ fn a_shifted_series_with_gaps_is_named_all_the_same() {
         corners.skipped.push(Skipped { pair: name.to_owned(), reason: "no board".to_owned() });
     }
     match calibrate_standing(&corners, &asked()) {
-        Err(Error::Shifted { fit, of, left, right }) => {
+        Err(Error::Shifted { fit, of, left, right, .. }) => {
             assert!(fit >= 4 && of <= 8 && left != right, "{fit} {of} {left} {right}")
         }
         other => panic!("{:?}", other.map(|(c, _)| c.rms_px)),
