@@ -78,13 +78,13 @@ pub(super) fn shifted(series: &Series) -> Result<Option<String>> {
     if rows.iter().any(|row| row.at.joints_deg.len() != robot.joints.len()) {
         return Ok(None);
     }
-    let said = |shift: Shift| {
+    let said = |(set, shift): (&Dataset, Shift)| {
         format!(
             "{}; look for a picture that failed or was taken twice there, and mend poses.csv or the pictures' names",
-            shift.statement(&set)
+            shift.statement(set)
         )
     };
-    Ok(shifted::find(&set, &robot).map(said))
+    Ok(shifted::found(&set, &robot).map(said))
 }
 
 /// Distances to each group's centre as commanded and what was measured beyond them, mm, where a robot of so many joints

@@ -112,6 +112,8 @@ pub struct Dataset {
     pub skipped: Vec<Skipped>,
     /// Readings that were repeated at one pose, where there were any.
     pub repeats: Option<Repeats>,
+    /// The same with points at equal joints as rows of their own where an instrument does not read one place so.
+    pub apart: Option<Box<Dataset>>,
     /// What each pose's point moves by with each shared error of the sensor, mm a standard deviation; or empty.
     pub shared: Vec<Matrix3xX<f64>>,
     /// Standard deviation of the scale of cameras about which nothing is stated, where `shared` is that scale alone.
@@ -162,7 +164,14 @@ impl Dataset {
 
     /// Of one row a pose, whose targets are these.
     pub fn of_rows(rows: &[Measurement], targets: Option<Targets>) -> Result<Dataset, Error> {
-        let (rows, repeats) = repeats::as_one(rows);
+        let apart = if targets.is_none() { repeats::apart(rows) } else { None };
+        let mut set = Dataset::of_poses(repeats::as_one(rows), targets)?;
+        set.apart = apart.map(|apart| Dataset::of_poses(apart, None)).transpose()?.map(Box::new);
+        Ok(set)
+    }
+
+    /// Of rows that were made one a pose.
+    fn of_poses((rows, repeats): repeats::AsOne, targets: Option<Targets>) -> Result<Dataset, Error> {
         let positions = rows.iter().any(|r| matches!(r.observed, Observed::Position { .. }));
         let kind = if positions { Kind::Positions } else { Kind::Distances };
         let slides = rows.first().map_or_else(Vec::new, |r| r.at.slides.clone());
@@ -358,43 +367,4 @@ fn reading(kind: Kind, row: &Measurement) -> Result<Reading, String> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::identify::synthetic;
-
-    fn row(name: usize, role: Role, observed: Observed) -> Measurement {
-        synthetic::row(format!("p{name}"), "g", role, vec![name as f64], observed)
-    }
-
-    fn point(x: f64) -> Observed {
-        synthetic::seen_at(Point3::new(x, 0.0, 0.0))
-    }
-
-    #[test]
-    fn the_reference_is_the_row_in_the_middle() {
-        let rows: Vec<_> = (0..25).map(|i| row(i, Role::Sample, point(i as f64))).collect();
-        let set = Dataset::new(&rows).unwrap();
-        assert_eq!((set.verify_rows().len(), set.fit_rows().len()), (0, 25));
-        assert_eq!(set.reference(0, &(0..25).collect::<Vec<_>>()), Some(12));
-    }
-
-    #[test]
-    fn a_missing_row_is_named_and_a_centre_of_distances_needs_no_number() {
-        let missing = Observed::Missing { reason: "no board".into() };
-        let distance = Observed::Distance { distance_mm: 5.0, sigma_mm: None };
-        let rows = vec![
-            row(0, Role::Center, missing.clone()),
-            row(1, Role::Sample, distance.clone()),
-            row(2, Role::Sample, missing),
-            row(3, Role::Verify, distance),
-        ];
-        let set = Dataset::new(&rows).unwrap();
-        assert_eq!(set.groups[0].center, Some(0));
-        assert_eq!(set.skipped, [Skipped { pose: "p2".into(), reason: "no board".into() }]);
-    }
-
-    #[test]
-    fn nothing_to_fit_is_said() {
-        assert!(Dataset::new(&[row(0, Role::Center, point(0.0)), row(1, Role::Verify, point(1.0))]).is_err());
-    }
-}
+mod tests;

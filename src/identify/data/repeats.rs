@@ -21,6 +21,12 @@ const TELL: usize = 3;
 const FAR: f64 = 12.0;
 const LEAST_MM: f64 = 0.2;
 
+/// Readings of one place are nearer to each other than this, mm, and those of two poses farther apart.
+const ONE_PLACE_MM: f64 = 1.0;
+
+/// Rows that were made one a pose, and what was repeated.
+pub type AsOne = (Vec<Measurement>, Option<Repeats>);
+
 /// Readings repeated at one pose.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Repeats {
@@ -56,13 +62,31 @@ impl Repeats {
 }
 
 /// One row a pose.
-pub fn as_one(rows: &[Measurement]) -> (Vec<Measurement>, Option<Repeats>) {
-    let same = |a: &Measurement, b: &Measurement| {
-        a.at.role != Role::Center
-            && (a.at.role, &a.at.group, &a.at.joints_deg, &a.target)
-                == (b.at.role, &b.at.group, &b.at.joints_deg, &b.target)
-            && numbers(a).is_some_and(|n| numbers(b).is_some_and(|m| m.len() == n.len()))
-    };
+pub fn as_one(rows: &[Measurement]) -> AsOne {
+    as_one_where(rows, same)
+}
+
+/// The same with readings that follow each other at equal joints far from each other left as they are: they are of two
+/// poses where joints and points are shifted. `None` where there are none.
+pub fn apart(rows: &[Measurement]) -> Option<AsOne> {
+    let is_apart = |pair: &[Measurement]| same(&pair[0], &pair[1]) && !near(&pair[0], &pair[1]);
+    rows.windows(2).any(is_apart).then(|| as_one_where(rows, |a, b| same(a, b) && near(a, b)))
+}
+
+/// Whether two rows are readings of one pose, by what is written.
+fn same(a: &Measurement, b: &Measurement) -> bool {
+    a.at.role != Role::Center
+        && (a.at.role, &a.at.group, &a.at.joints_deg, &a.target)
+            == (b.at.role, &b.at.group, &b.at.joints_deg, &b.target)
+        && numbers(a).is_some_and(|n| numbers(b).is_some_and(|m| m.len() == n.len()))
+}
+
+fn near(a: &Measurement, b: &Measurement) -> bool {
+    let apart = |(n, m): (Vec<f64>, Vec<f64>)| n.iter().zip(&m).map(|(n, m)| (n - m).powi(2)).sum::<f64>().sqrt();
+    numbers(a).zip(numbers(b)).map(apart).is_some_and(|mm| mm < ONE_PLACE_MM)
+}
+
+fn as_one_where(rows: &[Measurement], same: impl Fn(&Measurement, &Measurement) -> bool + Copy) -> AsOne {
     let mut merged = Vec::with_capacity(rows.len());
     let (mut readings, mut poses, mut squares, mut freedom) = (0, 0, 0.0, 0usize);
     let far = misread(rows, same);
@@ -183,5 +207,17 @@ mod tests {
         }
         // Of two readings nobody knows which is wrong.
         assert!(as_one(&[row(1.0, 0.1), row(1.0, 90.0), row(2.0, 5.0)]).1.unwrap().misread.is_empty());
+    }
+
+    #[test]
+    fn readings_far_from_each_other_are_apart() {
+        let is_apart = |by_mm: f64| apart(&[row(1.0, 0.1), row(1.0, 0.1 + by_mm), row(2.0, 5.0), row(2.0, 5.2)]);
+        for by_mm in [0.0, 0.02, 0.9] {
+            assert_eq!(is_apart(by_mm), None, "{by_mm}");
+        }
+        for by_mm in [1.1, 20.0, 1e4] {
+            let (rows, repeats) = is_apart(by_mm).unwrap();
+            assert_eq!((rows.len(), repeats.unwrap().poses), (3, 1), "{by_mm}");
+        }
     }
 }

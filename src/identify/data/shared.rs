@@ -56,7 +56,15 @@ struct PoseSensitivity {
 pub fn take(path: &Utf8Path, set: &mut Dataset) {
     let Ok(bytes) = std::fs::read(path) else { return };
     let Ok(Measured { shared: Some(shared) }) = serde_json::from_slice(&bytes) else { return };
-    if let Some((columns, own)) = split(&shared, set) {
+    put(&shared, set);
+}
+
+/// The same with what was read.
+fn put(shared: &Shared, set: &mut Dataset) {
+    if let Some(apart) = &mut set.apart {
+        put(shared, apart);
+    }
+    if let Some((columns, own)) = split(shared, set) {
         for (pose, own) in set.poses.iter_mut().zip(own) {
             if let Reading::Position { covariance_mm2, .. } = &mut pose.reading {
                 *covariance_mm2 = Some(own);
@@ -71,6 +79,9 @@ pub fn take(path: &Utf8Path, set: &mut Dataset) {
 /// a wrong scale has links of a wrong length, and nothing in the residuals tells; with the scale unknown, the links'
 /// tolerance has a say. Several targets are a tracker's, whose scale is its laser's.
 pub fn suppose_scale(set: &mut Dataset) {
+    if let Some(apart) = &mut set.apart {
+        suppose_scale(apart);
+    }
     let is_stated = set.poses.iter().all(|pose| pose.reading.covariance_mm2().is_some());
     if !set.shared.is_empty() || set.targets.is_some() || !set.has_rotations() || !is_stated {
         return;
