@@ -114,7 +114,7 @@ fn seen(set: &Dataset, robot: &Robot, settings: &Settings) -> Result<Vec<Seen>, 
         if numbers * rows.len() < FEWEST {
             return None;
         }
-        let squares: Vec<f64> = rows.iter().map(|d| d.square).collect();
+        let squares: Vec<f64> = rows.iter().map(|d| d.whole_square).collect();
         Some(Seen {
             name: (**name_of).to_owned(),
             stated_mm2: *stated_mm2,

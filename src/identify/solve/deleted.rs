@@ -50,8 +50,10 @@ const LEAST_ALONE: usize = 12;
 /// A row against what the others predict.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Deleted {
-    /// Its white square, the variance of the prediction counted.
+    /// Its white square, the variance of the prediction counted, and less where that is an extrapolation.
     pub square: f64,
+    /// The same, extrapolated or not.
+    pub whole_square: f64,
     /// Numbers of which it is the sum.
     pub numbers: usize,
     /// Degrees of freedom of the other rows, and their white sum of squares over them.
@@ -189,8 +191,8 @@ impl Robust<'_> {
                     numbers += at.len();
                 }
                 let square = square_by_others(&residual, leverage, weight(row), most);
-                if let Some(square) = square.filter(|square| *square > deleted[row].square) {
-                    deleted[row] = Deleted { square, numbers: at.len(), ..deleted[row] };
+                if let Some((square, whole_square)) = square.filter(|(square, _)| *square > deleted[row].square) {
+                    deleted[row] = Deleted { square, whole_square, numbers: at.len(), ..deleted[row] };
                 }
             }
         }
@@ -208,15 +210,16 @@ impl Robust<'_> {
     }
 }
 
-/// White square of a row's residual against what the others predict, extrapolation counted up to `most` times; `None`
-/// where hardly anything but the row itself says what it should be: rounding then decides what the others say.
-fn square_by_others(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64, most: f64) -> Option<f64> {
+/// White square of a row's residual against what the others predict, extrapolation counted up to `most` times, and
+/// without counting it; `None` where hardly anything but the row itself says what it should be: rounding then decides
+/// what the others say.
+fn square_by_others(fitted: &DVector<f64>, leverage: DMatrix<f64>, weight: f64, most: f64) -> Option<(f64, f64)> {
     let by_others = DMatrix::identity(fitted.len(), fitted.len()) - &leverage;
     if by_others.symmetric_eigenvalues().min() < LEAST_OTHERS {
         return None;
     }
     let (square, odds) = square_of_deleted(fitted, leverage, weight).unwrap_or((0.0, 1.0));
-    Some(square / odds.clamp(1.0, most))
+    Some((square / odds.clamp(1.0, most), square))
 }
 
 /// White square of a residual that was fitted with this leverage and root of a weight, held against the fit without it,
