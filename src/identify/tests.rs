@@ -115,7 +115,6 @@ fn the_nineteen_of_the_paper_are_more_than_its_plan_determines() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn unmodelled_effects_treat_all_methods_alike() {
     let spoil = |robot: &mut Robot| {
         robot.corrections.gravity = vec![GravityTerm { joint: 1, point: LoadPoint::Origin(4), k_rad_per_m: 2.5e-3 }];

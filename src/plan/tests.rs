@@ -190,7 +190,6 @@ fn first_poses_find_cameras_that_stand_elsewhere() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn places_out_of_reach_name_one_that_is_not() {
     let far = Settings { centers_mm: vec![Vector3::new(1500.0, 0.0, 300.0)], ..settings() };
     let said = plan(&robot(), &scene(), &far, None).unwrap_err();
@@ -202,7 +201,6 @@ fn places_out_of_reach_name_one_that_is_not() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn every_common_arm_has_a_plan() {
     for arm in catalogue::ARMS {
         let quick = Settings { pool: 150, samples: 20, verify: 4, ..settings() };

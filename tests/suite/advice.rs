@@ -110,7 +110,6 @@ fn a_robot_that_is_advised_against_is_used_with_its_reason_and_a_status() {
 /// A file in which one length is 7 mm off, as of a sister model, fits as well as the right one; targets that are
 /// compensated from it would not.
 #[test]
-#[ignore = "slow"]
 fn a_length_that_nobody_builds_so_is_named_by_whatever_uses_the_robot() {
     let folder = identified("robot.toml");
     let at = folder.path();
@@ -276,7 +275,6 @@ fn tables(at: &Path) {
 }
 
 #[test]
-#[ignore = "slow"]
 fn what_is_in_the_way_or_only_assumed_is_named() {
     let folder = workplace();
     let at = folder.path();

@@ -87,7 +87,6 @@ fn corners_of(path: &Path) -> Vec<(String, [f64; 4])> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn columns_behind_a_hand_are_numbered_by_the_other_pictures() {
     let folder = workplace();
     let pictures = copied(folder.path());
@@ -125,7 +124,6 @@ fn columns_behind_a_hand_are_numbered_by_the_other_pictures() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_is_counted_measured_and_read_from_files() {
     let folder = workplace();
     copied(folder.path());
@@ -165,7 +163,6 @@ fn a_board_is_counted_measured_and_read_from_files() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_grid_of_tags_is_calibrated_and_its_corners_have_kalibrs_numbers() {
     let folder = workplace();
     std::fs::write(
@@ -203,7 +200,6 @@ fn a_grid_of_tags_is_calibrated_and_its_corners_have_kalibrs_numbers() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
     let folder = workplace();
     copied(folder.path());
@@ -223,7 +219,6 @@ fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_changed_entry_of_the_cache_is_not_believed() {
     let folder = workplace();
     copied(folder.path());
@@ -253,7 +248,6 @@ fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn first_and_second_run_and_any_number_of_threads_give_the_same_bytes() {
     // The repository's pictures and a simulated world.
     for seed in 0..2 {
@@ -287,7 +281,6 @@ fn first_and_second_run_and_any_number_of_threads_give_the_same_bytes() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn another_size_of_board_is_named() {
     let folder = workplace();
     two_pairs(folder.path());
@@ -330,7 +323,6 @@ fn mixed_up_pictures_are_named_as_what_they_are() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn exchanged_folders_are_a_rig_and_said() {
     let folder = workplace();
     let pictures = copied(folder.path());
@@ -343,7 +335,6 @@ fn exchanged_folders_are_a_rig_and_said() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_in_a_larger_or_smaller_one_is_named() {
     let folder = workplace();
     two_pairs(folder.path());

@@ -116,19 +116,16 @@ fn full_size() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn reduced_by_two() {
     all_faults(SIZES[1], 0.0032);
 }
 
 #[test]
-#[ignore = "slow"]
 fn reduced_by_five() {
     all_faults(SIZES[2], 0.0022);
 }
 
 #[test]
-#[ignore = "slow"]
 fn few_and_many_squares() {
     for size in SIZES {
         for (squares, square_mm, floor_px) in [("5x5", 30.0, 0.005), ("40x30", 6.0, 0.008)] {

@@ -64,7 +64,6 @@ fn made() -> tempfile::TempDir {
 }
 
 #[test]
-#[ignore = "slow"]
 fn three_pairs_and_the_lenses_of_any_program_make_a_rig() {
     let folder = calibrated();
     let at = folder.path();
@@ -192,7 +191,6 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
 
 /// The volume that was judged, a second board, what lengths can be trusted to and why not, as the terminal has them.
 #[test]
-#[ignore = "slow"]
 fn a_check_says_what_it_judged_and_by_what() {
     let folder = calibrated();
     let at = folder.path();
@@ -260,7 +258,6 @@ fn a_check_says_what_it_judged_and_by_what() {
 /// Of pictures that the calibration was made of, under other names, a check says nothing: they are left out where the
 /// others are enough.
 #[test]
-#[ignore = "slow"]
 fn pairs_that_the_calibration_was_made_of_are_no_test_of_it() {
     let folder = calibrated();
     let at = folder.path();

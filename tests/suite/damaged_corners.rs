@@ -266,7 +266,6 @@ fn least_chi2(kind: &Kind) -> f64 {
 }
 
 #[test]
-#[ignore = "slow"]
 fn damaged_pictures_give_nearly_all_corners_with_true_covariances() {
     let mut short = Vec::new();
     for (first, kind) in kinds().into_iter().enumerate() {
@@ -287,7 +286,6 @@ fn damaged_pictures_give_nearly_all_corners_with_true_covariances() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_that_is_larger_is_refused_with_its_size() {
     let mut named_right = 0;
     for (k, setup) in setups().into_iter().enumerate().step_by(2) {

@@ -42,7 +42,6 @@ fn world() -> tempfile::TempDir {
 }
 
 #[test]
-#[ignore = "slow"]
 fn the_same_pictures_give_the_same_rig_whatever_their_names() {
     let folder = world();
     let root = folder.path();
@@ -84,7 +83,6 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn measure_finds_the_poses_beside_two_folders() {
     let folder = workplace();
     let root = folder.path();

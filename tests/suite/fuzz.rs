@@ -9,7 +9,6 @@ use crate::run::workplace;
 const RUNS: usize = 160;
 
 #[test]
-#[ignore = "slow"]
 fn no_reader_panics() {
     let folder = workplace();
     let root = camino::Utf8Path::from_path(folder.path()).expect("its name is UTF-8");

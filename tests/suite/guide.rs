@@ -40,7 +40,6 @@ fn files(text: &str) -> Vec<(&str, String)> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn every_command_of_the_guide_does_what_it_says() {
     let folder = workplace();
     let (mut done, mut run) = (BTreeSet::new(), Vec::new());

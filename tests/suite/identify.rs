@@ -196,7 +196,6 @@ fn verify_says_of_the_written_robot_what_identify_said() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn verify_reads_measurements_as_identify_does() {
     let folder = simulated_with(&["--samples", "96"]);
     let joints = |fields: &[String]| fields.iter().position(|f| f == "center" || f == "sample" || f == "verify");
@@ -402,7 +401,6 @@ fn of_targets(fields: &[String], names: [&str; 3], line: usize, turns: &Turns) -
 }
 
 #[test]
-#[ignore = "slow"]
 fn several_targets_a_pose_count_as_one_that_turns() {
     let folder = simulated_with(&["--samples", "60"]);
     let turns = true_turns(folder.path());
@@ -457,7 +455,6 @@ fn targets_that_cannot_be_made_one_are_refused() {
 
 /// The first lines say whether to use the result, and a robot of another make is not to be used.
 #[test]
-#[ignore = "slow"]
 fn another_arms_file_is_advised_against() {
     let folder = tempfile::tempdir().expect("a folder");
     let run = |arguments: &[&str]| {
@@ -498,7 +495,6 @@ fn another_arms_file_is_advised_against() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn with_the_file_of_another_arm_only_one_method_is_run_and_the_screen_says_why() {
     let folder = simulated();
     std::fs::copy(folder.path().join("measurements.csv"), folder.path().join("m.csv")).expect("copied");

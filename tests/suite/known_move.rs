@@ -32,7 +32,6 @@ fn json(path: &Path) -> Value {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_slide_confirms_the_scale_or_shows_squares_that_are_not_as_said() {
     let folder = pictures();
     let at = folder.path();

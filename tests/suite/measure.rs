@@ -41,7 +41,6 @@ fn column(path: &Path, name: &str) -> Vec<String> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn another_size_of_squares_and_exchanged_pictures_end_the_run() {
     let folder = calibrated();
     let world = folder.path();
@@ -149,7 +148,6 @@ fn poses_beyond_the_depth_of_the_boards_are_named() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn pictures_that_arrive_late_give_the_same_bytes() {
     let folder = calibrated();
     let world = folder.path().to_owned();

@@ -211,7 +211,6 @@ fn points_that_are_all_one_are_no_measurement() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn angles_that_were_rounded_are_the_reason() {
     let folder = identified();
     let at = folder.path();
@@ -272,7 +271,6 @@ fn a_robot_whose_last_link_holds_the_tool_is_compensated() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_tool_that_moved_is_the_only_reason_that_is_given() {
     let folder = workplace();
     let at = folder.path();

@@ -188,7 +188,6 @@ fn spot_by_rays(disc_px: f64, flare_px: (f64, f64)) -> Vec<(isize, isize, f64)> 
 }
 
 #[test]
-#[ignore = "slow"]
 fn defocus_and_coma_agree_with_rays() {
     let backdrop = Backdrop::plain(0.3);
     let board = board(Settings::small().check_workmanship);

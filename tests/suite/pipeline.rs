@@ -151,7 +151,6 @@ fn exported_rigs_measure_the_same_points(world: &Path) {
 }
 
 #[test]
-#[ignore = "slow"]
 fn one_thread_and_two_give_the_same_bytes() {
     let folder = workplace();
     let few = ["--check-pairs", "8", "--samples", "16", "--verify", "4"];

@@ -51,7 +51,6 @@ fn a_rig_that_failed_is_planned_with_in_so_many_words() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn the_files_are_those_of_the_contract() {
     let folder = workplace();
     let at = folder.path();
@@ -140,7 +139,6 @@ fn the_papers_plan_and_the_first_poses() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn plans_that_nobody_can_run_are_refused() {
     let folder = workplace();
     let at = folder.path();

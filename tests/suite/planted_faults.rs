@@ -24,7 +24,6 @@ const CHOSEN: [&str; 5] = [
 ];
 
 #[test]
-#[ignore = "slow"]
 fn planted_faults_do_not_pass() {
     let studio = Studio::new(None);
     let cases: Vec<_> = matrix::cases().into_iter().filter(|case| CHOSEN.contains(&case.name().as_str())).collect();

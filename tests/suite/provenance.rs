@@ -54,7 +54,6 @@ fn a_result_says_what_it_was_made_of() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn two_runs_differ_by_their_date_alone() {
     let folder = workplace();
     let path = folder.path();
@@ -133,7 +132,6 @@ fn an_input_is_not_overwritten_even_by_force() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn quiet_and_plain_progress() {
     let folder = workplace();
     let path = folder.path();

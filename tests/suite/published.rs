@@ -30,7 +30,6 @@ fn translation_sigmas(rig: &Rig) -> Vector3<f64> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn matlabs_calibration_of_duodic() {
     let Some(corners) = shared("stereo/duodic_corners/corners.csv") else { return };
     let corners = corners.to_str().unwrap();

@@ -63,7 +63,6 @@ fn boards_that_a_quick_look_misses() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn cameras_that_did_not_fire_together_are_refused() {
     let Some(images) = shared("stereo/baka") else { return };
     let folder = workplace();
@@ -75,7 +74,6 @@ fn cameras_that_did_not_fire_together_are_refused() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_robot_measured_by_a_laser_tracker() {
     let Some(robot) = shared("robot/irb120-tracker-a") else { return };
     let folder = workplace();

@@ -51,7 +51,6 @@ fn rectify(folder: &Path, more: &[&str]) -> std::process::Output {
 }
 
 #[test]
-#[ignore = "slow"]
 fn corresponding_corners_stand_on_one_row() {
     let folder = world();
     done(folder.path(), &[&["rectify", "check"], &TRUTH[..]].concat());
@@ -126,7 +125,6 @@ fn corresponding_corners_stand_on_one_row() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn the_board_is_the_one_that_the_pictures_show_and_its_size_tells_disparities_that_are_off() {
     let folder = world();
     let at = |name: &str| folder.path().join(name);
@@ -187,7 +185,6 @@ fn the_board_is_the_one_that_the_pictures_show_and_its_size_tells_disparities_th
 }
 
 #[test]
-#[ignore = "slow"]
 fn depth_colour_and_names_stay_and_other_sizes_are_refused() {
     let folder = world();
     let path = folder.path();

@@ -11,7 +11,6 @@ fn done(folder: &Path, arguments: &[&str]) -> String {
 }
 
 #[test]
-#[ignore = "slow"]
 fn what_happened_over_the_pairs_stands_before_the_checks() {
     let folder = workplace();
     let world = folder.path();
@@ -65,7 +64,6 @@ fn what_is_judged_adds_up(world: &Path, report: &str) {
 }
 
 #[test]
-#[ignore = "slow"]
 fn one_page_of_the_day() {
     let folder = workplace();
     let world = folder.path();

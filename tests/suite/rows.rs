@@ -29,7 +29,6 @@ fn shifted(text: &str, from: usize, by: isize) -> String {
 }
 
 #[test]
-#[ignore = "slow"]
 fn pictures_that_belong_to_other_rows_are_said_with_where_and_by_how_much() {
     let folder = pictures();
     let at = folder.path();
@@ -69,7 +68,6 @@ fn placement(path: &Path) -> Value {
 }
 
 #[test]
-#[ignore = "slow"]
 fn locate_measures_pictures_first() {
     let folder = pictures();
     let at = folder.path();
@@ -118,7 +116,6 @@ fn on_hand(at: &Path, hand: &Isometry3<f64>, inverted: bool) -> String {
 }
 
 #[test]
-#[ignore = "slow"]
 fn cameras_on_the_hand_are_refused_and_what_the_hint_says_works() {
     let folder = workplace();
     let at = folder.path();

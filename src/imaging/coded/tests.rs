@@ -74,7 +74,6 @@ fn squares(shot: Shot) -> Vec<f64> {
 }
 
 #[test]
-#[ignore = "slow"]
 fn parts_cut_by_the_border_are_as_certain_as_they_say() {
     let turns = [[0.4, 0.3, 0.5], [0.7, -0.4, 1.1]];
     let coded = [(-140.0, 0.0), (110.0, 60.0), (-90.0, -80.0), (60.0, 90.0), (70.0, 0.0), (-40.0, 45.0)];
@@ -152,7 +151,6 @@ fn a_grid_of_tags_is_told_whatever_its_gaps_are() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn another_board_is_named() {
     let plain = "checker:9x7:20";
     let others = [
@@ -284,7 +282,6 @@ fn markers_that_were_moved_give_no_corner_another_number() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn foreshortened_boards_are_measured() {
     let wide = "charuco:9x7:20:15:DICT_4X4_100";
     let tall = "charuco:8x11:24:18.75:DICT_4X4_1000";
@@ -318,7 +315,6 @@ fn foreshortened_boards_are_measured() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_with_markers_is_told_from_a_plain_one_that_was_asked_for() {
     let shot = |board: &'static str, at: [f64; 3]| Shot::of(board, [0.3, -0.25, 0.2], at).taken().0;
     for (board, at) in [

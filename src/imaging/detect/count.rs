@@ -41,7 +41,6 @@ mod tests {
     use crate::imaging::shot::{Shot, with_pixels};
 
     #[test]
-    #[ignore = "slow"]
     fn whole_boards_are_counted_and_others_are_not() {
         for (board, z) in [("checker:9x7:20", 560.0), ("checker:10x7:16", 560.0), ("checker:6x6:20", 420.0)] {
             for turn in [[0.3, -0.25, 0.2], [-0.2, 0.3, 1.7]] {

@@ -57,7 +57,6 @@ const BOARDS: [&str; 4] = ["checker:9x7:20", "checker:10x7:20", "checker:8x8:18"
 const TURNS: [[f64; 3]; 3] = [[-0.5, 0.5, 0.2], [0.0, 0.0, 0.0], [0.7, -0.4, 1.1]];
 
 #[test]
-#[ignore = "slow"]
 fn a_board_cut_by_borders_has_no_wrong_number() {
     let mut tally = Tally::default();
     for (first, board) in BOARDS.into_iter().enumerate() {
@@ -74,7 +73,6 @@ fn a_board_cut_by_borders_has_no_wrong_number() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_behind_a_hand_has_no_wrong_number() {
     let mut tally = Tally::default();
     for board in [BOARDS[0], BOARDS[2]] {

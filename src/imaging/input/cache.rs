@@ -296,7 +296,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "slow"]
     fn the_algorithm_is_named_by_what_it_finds() {
         let board = Board::checker("9x7".parse().unwrap(), 10.0);
         let eight = |size: usize, side: f64, zigzag: f64| {

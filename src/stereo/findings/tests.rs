@@ -63,7 +63,6 @@ fn a_clean_series_of_any_noise_loses_nothing() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_camera_that_moved_leaves_the_last_rig() {
     let shifts = [
         ("1 mm", Vector3::zeros(), Vector3::new(0.0, 0.0, 1.0)),
@@ -148,7 +147,6 @@ fn two_pairs_out_of_step() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
     // The lenses take up some of it, and with that some of what is not known of its size.
     for (w, (size_deg, most_focal)) in [(0.01_f64, 2.5), (0.05, 10.0)].into_iter().enumerate() {
@@ -184,7 +182,6 @@ fn a_rig_that_drifts_is_that_of_the_middle_and_no_picture_was_late() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_focus_that_drifts_is_nothing_that_moved_between_two_pictures() {
     for (w, share) in [5e-4, 2e-3].into_iter().enumerate() {
         let world = one_of(w, 12, 31);
@@ -266,7 +263,6 @@ fn small_noisy_pictures_fit_one_rig() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn a_board_whose_squares_are_not_as_wide_as_high_as_was_said_is_named_by_its_ratio() {
     for (case, stretch) in [0.004, -0.03].into_iter().enumerate() {
         let mut corners = one_of(case, 12, 4).corners(4);

@@ -85,7 +85,6 @@ fn a_pair_that_contradicts_the_others_is_named() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
     // Boards that hardly lean leave lens and place of the cameras in a bent valley.
     const WORLDS: u64 = 2;
@@ -110,7 +109,6 @@ fn pairs_by_hand_that_hardly_know_their_lenses_raise_no_alarm() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn pairs_that_contradict_each_other_tell_no_absurd_change() {
     // Boards that hardly lean, and one pair in three whose pictures were taken farther apart in time than the others':
     // in one of these worlds the pairs' own rig has a focal length that is 4 % off.

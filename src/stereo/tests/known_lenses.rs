@@ -119,7 +119,6 @@ fn by_hand(turn_deg: f64) -> [[f64; 2]; 2] {
 }
 
 #[test]
-#[ignore = "slow"]
 fn three_pairs_that_scatter_do_not_pull_the_lenses_from_what_is_known_of_them() {
     let [[told, of_baseline], [alone, _]] = by_hand(0.03);
     // What is known is known to one standard deviation; pairs that weigh by their corners' noise alone pull by many.

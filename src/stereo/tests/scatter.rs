@@ -145,7 +145,6 @@ fn the_rigs_covariance_holds_for_print_that_is_seen_through_windows() {
 
 /// Few pairs go after the rig's own numbers; how far they scatter about it is told no smaller for that.
 #[test]
-#[ignore = "slow"]
 fn four_pairs_scatter_about_their_rig_as_far_as_many_do() {
     let excess = |pairs: usize, turn_deg: f64| {
         const WORLDS: u64 = 3;

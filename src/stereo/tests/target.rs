@@ -142,7 +142,6 @@ fn a_camera_that_turned_is_not_told_as_a_target_of_another_size() {
 /// Boards held by hand before cameras that nobody triggers: what the pairs of the calibration did, poses may do; one
 /// that does much more is named.
 #[test]
-#[ignore = "slow"]
 fn the_pairs_of_a_calibration_are_measured_by_it() {
     for turn_deg in [0.01, 0.05] {
         let world = World::new(12, 41);
@@ -168,7 +167,6 @@ fn the_pairs_of_a_calibration_are_measured_by_it() {
 /// A lens with a free tilt and no distortion leaves open where its axis points: what turns all points about the camera
 /// together is no error.
 #[test]
-#[ignore = "slow"]
 fn points_are_not_off_by_what_turns_them_all_together() {
     let mut world = World::new(12, 37).with_lens(Lens::Tilted14, |d| d.fill(0.0));
     world.sigma_px = 0.02;
@@ -191,7 +189,6 @@ fn points_are_not_off_by_what_turns_them_all_together() {
 
 /// What one pair of the calibration did, a pose may do: it is measured, and known as well as it agrees with the others.
 #[test]
-#[ignore = "slow"]
 fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_well() {
     let world = World::new(12, 47);
     let clean = world.corners_by_hand(47, 0.01);
@@ -224,7 +221,6 @@ fn a_pose_that_strays_as_far_as_a_pair_that_was_used_is_measured_and_says_how_we
 /// A lens that warms up during the run: what its poses have in common looks like another change as well, and is named
 /// as what it is.
 #[test]
-#[ignore = "slow"]
 fn a_focus_that_creeps_is_not_named_as_something_that_all_poses_have() {
     for (seed, sizes_ppm) in [(50, &[20.0, 500.0][..]), (51, &[100.0])] {
         let mut world = World { sigma_px: 0.002, ..World::new(14, seed) };

@@ -8,20 +8,26 @@ mod sizes;
 use std::path::{Path, PathBuf};
 
 fn source_files() -> Vec<PathBuf> {
+    let mut files = rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"));
+    files.retain(|path| !path.ends_with("tests.rs"));
+    assert!(files.len() > 10, "the source was not found");
+    files
+}
+
+fn rust_files(folder: &Path) -> Vec<PathBuf> {
     fn walk(folder: &Path, into: &mut Vec<PathBuf>) {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             if path.is_dir() {
                 walk(&path, into);
-            } else if path.extension().is_some_and(|e| e == "rs") && !path.ends_with("tests.rs") {
+            } else if path.extension().is_some_and(|e| e == "rs") {
                 into.push(path);
             }
         }
     }
     let mut files = Vec::new();
-    walk(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    walk(folder, &mut files);
     files.sort();
-    assert!(files.len() > 10, "the source was not found");
     files
 }
 
@@ -48,6 +54,19 @@ fn without_tests(text: &str) -> Vec<(usize, String)> {
         }
     }
     kept
+}
+
+/// Every test that `scripts/test` leaves for `.ci/run` is there, by its name.
+#[test]
+fn tests_that_are_called_slow_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let files = ["src", "tests/suite"].into_iter().flat_map(|folder| rust_files(&root.join(folder)));
+    let text: String = files.map(|path| std::fs::read_to_string(path).unwrap()).collect();
+    let slow = std::fs::read_to_string(root.join("tests/slow")).unwrap();
+    for name in slow.lines() {
+        let function = name.rsplit("::").next().unwrap();
+        assert!(text.contains(&format!("fn {function}()")), "{name}");
+    }
 }
 
 #[test]

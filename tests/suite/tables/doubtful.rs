@@ -120,7 +120,6 @@ fn what_is_not_read_is_refused_and_a_joint_that_stands_still_is_a_joint() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn points_that_were_computed_are_said_to_be() {
     let folder = workplace();
     let (_, rows) = world(30);
@@ -182,7 +181,6 @@ fn built(more: impl Fn(&mut Robot)) -> Robot {
 }
 
 #[test]
-#[ignore = "slow"]
 fn the_links_of_another_arm_are_none_of_this_one() {
     let (said, status) = verdict("ur5e", &of_arm(&built(|_| {}), 60, 0.03, 1.0));
     assert!(said.starts_with("use") && status == 0, "{said}");

@@ -165,7 +165,6 @@ fn what_lies_the_other_way_round_and_other_sheets_are_said() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn what_is_far_off_is_said_of_the_sum_that_is_determined() {
     let folder = Folder(workplace());
     let nominal = Robot::paper();

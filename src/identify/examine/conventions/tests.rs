@@ -47,7 +47,6 @@ fn shifted(rows: &[Measurement], by: impl Fn(usize) -> f64) -> Vec<Measurement> 
 }
 
 #[test]
-#[ignore = "slow"]
 fn what_a_fit_swallows_where_joints_move_little_is_named() {
     let seed = 1;
     let (world, rows) = one_sphere(8.0, seed);

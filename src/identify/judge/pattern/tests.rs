@@ -38,7 +38,6 @@ fn readings_that_scatter_by_millimetres_follow_no_joint() {
 }
 
 #[test]
-#[ignore = "slow"]
 fn what_another_arms_file_leaves_follows_the_joints() {
     assert_eq!(scattering("abb-irb120", "ur10", 0.05), 0);
     assert_eq!(scattering("ur10", "kuka-kr6-r900", 0.05), 0);

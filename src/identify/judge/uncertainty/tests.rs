@@ -29,7 +29,6 @@ fn poses_that_were_fitted_are_no_better_known_than_others_like_them() {
 
 /// Few rows tell their scatter badly: a fit that follows them by chance is no better for it.
 #[test]
-#[ignore = "slow"]
 fn nineteen_of_twenty_errors_at_fresh_poses_are_below_what_is_promised() {
     for samples in [10, 16] {
         let (mut below, mut all) = (0, 0);

@@ -122,7 +122,6 @@ fn tally(robots: u64, samples: usize, oriented: bool, extensions: Extensions) ->
 }
 
 #[test]
-#[ignore = "slow"]
 fn stated_uncertainties_are_those_of_simulated_robots() {
     for oriented in [false, true] {
         let Tally { sensor, target, coordinates, scatter } = tally(8, 60, oriented, Extensions::None);

@@ -64,7 +64,6 @@ mod tests {
     /// How surely it does so, from other starts and with other constants, `cargo bench --bench identify -- constants`
     /// counts.
     #[test]
-    #[ignore = "slow"]
     fn stapso_ends_at_the_best_of_many_starts_and_below_the_other_swarms() {
         let prepared = prepared(0.02);
         let fit = prepared.fit();

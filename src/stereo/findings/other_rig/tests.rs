@@ -38,7 +38,6 @@ fn turned(corners: &Corners, world: &World, at: usize, turns_deg: [[f64; 3]; 2])
 }
 
 #[test]
-#[ignore = "slow"]
 fn two_pairs_are_of_another_rig_where_they_fit_one_of_their_own() {
     for (case, hand_deg) in [0.0, 0.03].into_iter().enumerate() {
         let world = World::new(12, 3 + case as u64);
@@ -92,7 +91,6 @@ fn of_two_moments(corners: &Corners) -> Vec<Finding> {
 
 /// From a motion on that leaves several times what the corners do.
 #[test]
-#[ignore = "slow"]
 fn pictures_of_two_moments_are_named_with_the_size_of_it_and_clean_ones_are_not() {
     for (seed, hand_deg, is_alike) in
         [(3, 0.0, true), (4, 0.0, false), (3, 0.02, false), (4, 0.02, true), (3, 0.05, true)]
