@@ -16,8 +16,6 @@ use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::mixups::mirror;
 use crate::stereo::pairs::shifts::{self, Partners};
 
-/// Shifts of all pairs that are tried where the poses tell none, in pairs.
-const TRIED: [isize; 4] = [1, -1, 2, -2];
 /// Share of the pairs that must fit one rig then.
 const MOST: f64 = 0.8;
 
@@ -50,7 +48,6 @@ pub fn explain(
     };
     let open = corners.board.turns_left_open();
     shifted(series.by_poses(known))
-        .or_else(|| TRIED.into_iter().find_map(|by| shifted(series.by_shift(by))))
         .or_else(|| turns().find_map(|quarters| changed(OneSide::Mirrored, quarters)))
         .or_else(|| turns().filter(|q| !open.contains(q)).find_map(|quarters| changed(OneSide::Inverted, quarters)))
         .unwrap_or(error)
@@ -71,15 +68,6 @@ impl<'a> Series<'a> {
         names.dedup();
         let pairs = names.iter().map(|name| corners.pairs.iter().find(|pair| pair.pair == *name)).collect();
         Series { corners, names, pairs }
-    }
-
-    /// Each left picture with the right one that comes so many pairs later.
-    fn by_shift(&self, by: isize) -> Vec<Partners> {
-        let pair = |left: usize| {
-            let right = left.checked_add_signed(by).filter(|right| *right < self.names.len())?;
-            Some(Partners { left, right, agree: self.pairs[left].is_some() && self.pairs[right].is_some() })
-        };
-        (0..self.names.len()).filter_map(pair).collect()
     }
 
     /// The pairs that the board's poses lead to; none where most of them agree with no rig.
