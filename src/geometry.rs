@@ -96,11 +96,19 @@ pub fn cross_covariance(
     pairs: impl Iterator<Item = (Point3<f64>, Point3<f64>, f64)>,
 ) -> (Vector3<f64>, Vector3<f64>, Matrix3<f64>) {
     let pairs: Vec<_> = pairs.collect();
-    let n = pairs.iter().map(|(_, _, w)| w).sum::<f64>().max(f64::MIN_POSITIVE);
-    let mean_a = pairs.iter().map(|(a, _, w)| a.coords * *w).sum::<Vector3<f64>>() / n;
-    let mean_b = pairs.iter().map(|(_, b, w)| b.coords * *w).sum::<Vector3<f64>>() / n;
-    let products = pairs.iter().map(|(a, b, w)| (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w);
-    (mean_a, mean_b, products.sum())
+    let (mut n, mut mean_a, mut mean_b) = (0.0, Vector3::zeros(), Vector3::zeros());
+    for (a, b, w) in &pairs {
+        n += w;
+        mean_a += a.coords * *w;
+        mean_b += b.coords * *w;
+    }
+    let n = f64::max(n, f64::MIN_POSITIVE);
+    (mean_a, mean_b) = (mean_a / n, mean_b / n);
+    let mut products = Matrix3::zeros();
+    for (a, b, w) in &pairs {
+        products += (b.coords - mean_b) * (a.coords - mean_a).transpose() * *w;
+    }
+    (mean_a, mean_b, products)
 }
 
 /// The rotation R with the largest trace of R' M.

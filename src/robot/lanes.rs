@@ -102,10 +102,24 @@ impl Frames {
         }
     }
 
-    /// The rotation and the target's point at one of the poses, with the target at `tool_mm` in the frame, mm.
+    /// Takes the rotation and the target's point at each of the poses, with the target at `tool_mm` in the frame, mm.
     #[inline(always)]
-    pub fn end(&self, pose: usize, tool_mm: &Vector3<f64>) -> (Matrix3<f64>, Point3<f64>) {
-        let rotation = Matrix3::from_fn(|row, column| self.columns[column][row][pose]);
-        (rotation, Point3::from(Vector3::from_fn(|row, _| self.origin_mm[row][pose])) + rotation * tool_mm)
+    pub fn ends(&self, tool_mm: &Vector3<f64>) -> impl Fn(usize) -> (Matrix3<f64>, Point3<f64>) {
+        let [x, y, z] = &self.columns;
+        let mut target_mm = self.origin_mm;
+        for (i, target) in target_mm.iter_mut().enumerate() {
+            for l in 0..LANES {
+                target[l] += x[i][l] * tool_mm.x + y[i][l] * tool_mm.y + z[i][l] * tool_mm.z;
+            }
+        }
+        let [tx, ty, tz] = target_mm;
+        #[inline(always)]
+        move |pose: usize| {
+            let rotation = Matrix3::new(
+                x[0][pose], y[0][pose], z[0][pose], x[1][pose], y[1][pose], z[1][pose], x[2][pose], y[2][pose],
+                z[2][pose],
+            );
+            (rotation, Point3::new(tx[pose], ty[pose], tz[pose]))
+        }
     }
 }

@@ -110,6 +110,9 @@ pub fn find(set: &Dataset, robot: &Robot) -> Option<Shift> {
     let rows = Rows::new(set, robot)?;
     let count = rows.count();
     let before = rows.as_written();
+    if rows.stand(&before, MOST.unsigned_abs()) {
+        return None;
+    }
     let last = count - FEWEST;
     let step = (count / GRID).max(1);
     let sides = if rows.has_groups() { &[Side::Joints, Side::Points][..] } else { &[Side::Joints] };

@@ -129,7 +129,12 @@ impl Kinematics {
         let mut places = Vec::with_capacity(LANES * self.lanes.len());
         widest(
             #[inline(always)]
-            || self.lanes.iter().for_each(|lanes| self.ends(&shifted, lanes, &mut places)),
+            || {
+                // A loop, as the iterator's own may not be inlined.
+                for lanes in &self.lanes {
+                    self.ends(&shifted, lanes, &mut places);
+                }
+            },
         );
         places
     }
@@ -141,10 +146,12 @@ impl Kinematics {
         for (i, joint) in shifted.robot.joints.iter().enumerate() {
             frames.over(joint.a_mm, &self.stances(shifted, lanes, i));
         }
-        places.extend((0..lanes.poses).map(|pose| {
-            let (rotation, point_mm) = frames.end(pose, &shifted.robot.tool_mm);
-            Place { point_mm, rotation, point_columns: Matrix3xX::zeros(0), rotation_columns: Matrix3xX::zeros(0) }
-        }));
+        let at = frames.ends(&shifted.robot.tool_mm);
+        for pose in 0..lanes.poses {
+            let (rotation, point_mm) = at(pose);
+            let (point_columns, rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
+            places.push(Place { point_mm, rotation, point_columns, rotation_columns });
+        }
     }
 
     /// How a joint stands.

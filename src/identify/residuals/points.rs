@@ -118,11 +118,15 @@ impl Points {
     fn white(&self, state: &State, frame: &Transform) -> DVector<f64> {
         let rows = self.rows_a_spot();
         let mut white = DVector::zeros(rows * self.spots.len());
-        let of_spots = self.turned(state, frame).zip(self.turns(state, frame));
-        for (i, (spot, ((_, residual), turn))) in self.spots.iter().zip(of_spots).enumerate() {
-            white.fixed_rows_mut::<3>(rows * i).copy_from(&(spot.whitener * residual));
-            if let Some((turn, weight)) = turn {
-                white.fixed_rows_mut::<3>(rows * i + 3).copy_from(&(weight * turn));
+        let rows_of_spots = white.as_mut_slice().chunks_exact_mut(rows);
+        for ((white, spot), (_, residual)) in rows_of_spots.zip(&self.spots).zip(self.turned(state, frame)) {
+            white[..3].copy_from_slice((spot.whitener * residual).as_slice());
+        }
+        if self.oriented {
+            for (white, turn) in white.as_mut_slice().chunks_exact_mut(rows).zip(self.turns(state, frame)) {
+                if let Some((turn, weight)) = turn {
+                    white[3..].copy_from_slice((weight * turn).as_slice());
+                }
             }
         }
         white

@@ -251,6 +251,10 @@ impl Table {
     /// The stretches of rows that are of different robots.
     fn stretches(&self) -> Option<Judged> {
         let mut parts: Vec<Vec<usize>> = vec![(0..self.rows.len()).collect()];
+        // Of rows that one robot explains nothing can be cut off.
+        if self.points.together(&parts, &self.points.without_gross(&parts)).scatter_mm() < REPEATABILITY_MM {
+            return None;
+        }
         let mut tried = 1.0;
         while parts.len() < MOST_PARTS {
             let cuts = parts.iter().enumerate().filter_map(|(p, part)| Some((p, self.best_cut(part)?)));
