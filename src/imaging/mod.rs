@@ -9,6 +9,7 @@ mod error;
 pub mod find;
 pub mod image;
 pub mod input;
+pub mod kind;
 pub mod lattice;
 pub mod order;
 pub mod overlay;

@@ -200,6 +200,23 @@ fn a_grid_of_tags_is_calibrated_and_its_corners_have_kalibrs_numbers() {
 }
 
 #[test]
+fn a_board_with_markers_that_is_said_to_be_plain_is_named() {
+    let folder = workplace();
+    let config = "[check_board]\nboard = \"charuco:7x5:24:18:DICT_4X4_50\"\n";
+    std::fs::write(folder.path().join("stereocal.toml"), config).unwrap();
+    let simulate =
+        ["simulate", "--size", "700", "--check-pairs", "6", "--samples", "1", "--verify", "1", "--out", "world"];
+    assert_eq!(stereocal(folder.path(), &simulate).status.code(), Some(0));
+    std::fs::remove_file(folder.path().join("stereocal.toml")).unwrap();
+    let plain = ["camera-check", "world/check", "--squares", "7x5", "--square-mm", "24"];
+    let output = stereocal(folder.path(), &plain);
+    let said = stderr(&output);
+    assert!(output.status.code().is_some_and(|status| status > 1), "{said}");
+    assert!(said.contains("shows a board with markers of DICT_4X4_50 in its squares"), "{said}");
+    assert!(said.contains("`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_4X4_50`"), "{said}");
+}
+
+#[test]
 fn a_second_run_reads_what_the_first_found_and_survives_a_torn_file() {
     let folder = workplace();
     copied(folder.path());

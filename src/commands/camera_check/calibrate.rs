@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use camino::Utf8Path;
 
-use super::super::{Outcome, Result};
+use super::super::{Error, Outcome, Result};
 use super::squares::squares;
 use crate::cli::{BoardShape, CameraCheck};
 use crate::config::{self, Config};
@@ -21,7 +21,7 @@ use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
 use crate::imaging::overlay::SideBySide;
-use crate::imaging::{self, Board, Corners, Side, Wanted, find_corners};
+use crate::imaging::{self, Board, Corners, Side, Wanted, find_corners, kind};
 use crate::report::drawing::pair_picture::PairPicture;
 use crate::report::drawing::picture::PairJpeg;
 use crate::stereo::calibrate::Calibration;
@@ -38,7 +38,7 @@ use crate::stereo::model::known_lenses::{KnownLenses, TOLERANCE};
 use crate::stereo::pairs::{fewest_pairs, open_numbers};
 use crate::stereo::select::options::Options;
 use crate::stereo::volume;
-use crate::{progress, ranges, report};
+use crate::{progress, ranges, report, stereo};
 
 pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     if let Some(against) = &args.against {
@@ -60,10 +60,11 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let asked = Asked { options: options(args, known), tolerance_mm: demand.tolerance_mm, extent: demand.extent };
     let corners = open_numbers::by_other_pairs(corners, &asked.options);
     corners.notes.iter().for_each(progress::note);
-    let (calibration, findings) = match &args.since {
-        Some(pair) => standing::calibrate_since(&corners, pair, &asked)?,
-        None => standing::calibrate_standing(&corners, &asked)?,
+    let calibrated = match &args.since {
+        Some(pair) => standing::calibrate_since(&corners, pair, &asked),
+        None => standing::calibrate_standing(&corners, &asked),
     };
+    let (calibration, findings) = calibrated.map_err(|error| explained(error, args, board, pairing.as_ref()))?;
     volume::lengths::check(&calibration, demand.extent)?;
     moved_tags::said(&calibration).iter().for_each(progress::warn);
     said_spread(&calibration, demand.tolerance_mm).iter().for_each(progress::note);
@@ -96,6 +97,14 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json { json } else { report::camera_check::summary(&calibration, &judged, &out) };
     let status = if judged.verdict == Verdict::Pass { Status::Done } else { Status::OutOfTolerance };
     Ok(Outcome { stdout, status })
+}
+
+/// The error of pairs that contradict each other, or that of a board of another kind where they show one.
+fn explained(error: stereo::Error, args: &CameraCheck, board: Board, pairing: Option<&Pairing>) -> Error {
+    let stereo::Error::Contradiction { total, .. } = error else { return error.into() };
+    let needed = fewest_pairs(None).min(total);
+    let markers = pairing.and_then(|pairing| kind::with_markers(pairing, &board, needed, args.bayer));
+    markers.map_or_else(|| error.into(), Error::from)
 }
 
 /// That black has spread on the board and its corners with it, where it is seen to have.

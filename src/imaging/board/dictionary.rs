@@ -69,9 +69,12 @@ impl Dictionary {
         if self.is_of_tags() { self.tag_name() } else { self.name().to_owned() }
     }
 
-    /// All that there are.
+    /// All that there are, the smallest first: where two begin alike, it comes before the one that goes on.
     pub fn all() -> impl Iterator<Item = Dictionary> {
-        BUILTIN_DICTIONARY_NAMES.iter().filter_map(|name| builtin_dictionary(name)).map(Dictionary)
+        let known = BUILTIN_DICTIONARY_NAMES.iter().filter_map(|name| builtin_dictionary(name)).map(Dictionary);
+        let mut all: Vec<Dictionary> = known.collect();
+        all.sort_by_key(|dictionary| dictionary.count());
+        all.into_iter()
     }
 
     /// OpenCV's name.
