@@ -125,9 +125,9 @@ fn at_least(needed: usize) -> String {
 fn the_rest(not_searched: usize) -> String {
     match not_searched {
         0 => String::new(),
-        n => format!(
-            "\n  {n} more pairs were not searched: those that were are spread over all, and show the same other board"
-        ),
+        n => {
+            format!("\n  {n} more pairs were not searched: those that were are spread over all, and show another board")
+        }
     }
 }
 

@@ -21,7 +21,7 @@ use super::input::pairs::{PairFiles, Pairing};
 use super::lattice::Lattice;
 use super::refine::fields;
 use super::shown::{missing_tags, printed, unseen_lines};
-use super::sort::{Sorted, in_one_layout, number_alike, other_board, shown_by_all, sort_out, with_common_sizes};
+use super::sort::{Sorted, in_one_layout, number_alike, other_board, shown_instead, sort_out, with_common_sizes};
 use super::{Board, Corner, Corners, Error, PairCorners, Result, Side, Skipped, Squares, overlay, refine};
 use crate::diagnostic::count;
 use crate::files::OutDir;
@@ -67,7 +67,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     };
     let [first, rest] = first_pairs(total);
     let mut seen: Vec<(usize, [Look; 2])> = first.iter().copied().zip(look_at(&first)).collect();
-    if let Some(other) = shown_by_all(seen.iter().map(|(_, looks)| looks)).filter(|_| !rest.is_empty()) {
+    if let Some(other) = shown_instead(seen.iter().map(|(_, looks)| looks)).filter(|_| !rest.is_empty()) {
         bar.finish_and_clear();
         let files: Vec<PairFiles> = first.iter().map(|&i| pairing.pairs[i].clone()).collect();
         let skipped = sort_out(&files, seen.into_iter().map(|(_, looks)| looks).collect(), wanted.board).skipped;
