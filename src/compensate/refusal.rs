@@ -1,5 +1,7 @@
 //! Why a target is left as it is.
 
+use crate::diagnostic::two_digits;
+
 /// Why a target has no compensated readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
@@ -45,7 +47,7 @@ pub enum Refusal {
 impl std::fmt::Display for Refusal {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Refusal::OutOfReach { short_mm } => write!(f, "out of reach by {short_mm:.2} mm"),
+            Refusal::OutOfReach { short_mm } => write!(f, "out of reach by {} mm", two_digits(*short_mm)),
             Refusal::Limit { joint, needed, range: (low, high) } => {
                 write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
             }

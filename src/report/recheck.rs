@@ -7,7 +7,7 @@ use super::Result;
 use super::drawing::figure::Plot;
 use super::page::{self, Tone};
 use super::table::{Table, with_sigma};
-use crate::diagnostic::{count, two_digits};
+use crate::diagnostic::{count, short, two_digits};
 use crate::files::OutDir;
 use crate::formats::recheck::{Check, Standing};
 use crate::stereo::recheck::{CauseSeen, Recheck};
@@ -34,7 +34,7 @@ pub(super) fn tone(standing: Standing) -> Tone {
 
 /// What was found and what it means, in a sentence.
 fn sentence(recheck: &Recheck, standing: Standing, tolerance_mm: f64, mm: fn(f64) -> String) -> String {
-    let length = recheck.length_mm;
+    let length = short(recheck.length_mm);
     if let Some((contradicted, _)) = standing.contradicted(recheck) {
         return contradicted;
     }

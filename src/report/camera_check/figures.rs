@@ -1,6 +1,6 @@
 //! The plots: errors of lengths, what the model leaves of the corners, and how uncertain lengths are over the volume.
 
-use crate::diagnostic::two_digits;
+use crate::diagnostic::{short, two_digits};
 use crate::report::Result;
 use crate::report::drawing::figure::Plot;
 use crate::report::page;
@@ -14,10 +14,12 @@ use maud::{Markup, html};
 /// Fig. 6 of the paper, (a) to (d).
 pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     let accuracy = &judged.facts.accuracy;
-    let [long, _] = accuracy.long_mm;
-    let [short, _] = accuracy.short_mm;
+    let ([x_long, y_long], [x_short, y_short]) = (accuracy.long_mm.map(short), accuracy.short_mm.map(short));
     let guard = |plot: Plot| plot.hline(judged.facts.tolerance_mm, "tolerance").hline(-judged.facts.tolerance_mm, "");
-    let title = format!("(a) Errors of all lengths of {long} mm");
+    let title = match x_long == y_long {
+        true => format!("(a) Errors of all lengths of {x_long} mm"),
+        false => format!("(a) Errors of all lengths of {x_long} mm along x and {y_long} mm along y"),
+    };
     let a = Plot::new(&title, "pair used, in the order of names", "error, mm").whole_x();
     let a = guard(a.points("", every_length(accuracy))).svg()?;
     let mean = |of: fn(&HeldOutPair) -> Option<f64>| {
@@ -25,10 +27,10 @@ pub(super) fn lengths(judged: &Judged) -> Result<Markup> {
     };
     let b = Plot::new("(b) Mean error of every pair", "pair used, in the order of names", "mean error, mm")
         .whole_x()
-        .points(&format!("x {short} mm"), mean(|p| p.mean_error_x_short_mm))
-        .points(&format!("y {short} mm"), mean(|p| p.mean_error_y_short_mm))
-        .points(&format!("x {long} mm"), mean(|p| p.mean_error_x_long_mm))
-        .points(&format!("y {long} mm"), mean(|p| p.mean_error_y_long_mm))
+        .points(&format!("x {x_short} mm"), mean(|p| p.mean_error_x_short_mm))
+        .points(&format!("y {y_short} mm"), mean(|p| p.mean_error_y_short_mm))
+        .points(&format!("x {x_long} mm"), mean(|p| p.mean_error_x_long_mm))
+        .points(&format!("y {y_long} mm"), mean(|p| p.mean_error_y_long_mm))
         .svg()?;
     let range_plot = |title: &str, along: Axis| {
         let ranges = || accuracy.ranges.iter().filter(|r| r.axis == along);

@@ -64,9 +64,9 @@ pub struct Accuracy {
     pub unchecked: Vec<String>,
     /// What leaving out each fold does to the shared numbers.
     pub fold_steps: Vec<DVector<f64>>,
-    /// Lengths of the short and the long range, mm, along x and y alike where the board allows.
+    /// Short range along x and y, mm.
     pub short_mm: [f64; 2],
-    /// Long range along x and y, mm.
+    /// Long range along x and y, mm: as long as the board allows.
     pub long_mm: [f64; 2],
     /// Every range, x first, from the shortest.
     pub ranges: Vec<Range>,
@@ -211,8 +211,8 @@ fn summarise(
         folds: folds.rigs.len(),
         unchecked,
         fold_steps: folds.rigs.into_iter().flatten().map(|fold| fold.step).collect(),
-        short_mm: short.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
-        long_mm: long.map(|s| lengths::as_written_mm(board.spans_mm(s)[0])),
+        short_mm: [0, 1].map(|axis| lengths::as_written_mm(board.spans_mm(short[axis])[axis])),
+        long_mm: [0, 1].map(|axis| lengths::as_written_mm(board.spans_mm(long[axis])[axis])),
         ranges: all_ranges(board, measured),
         pairs,
     })
