@@ -180,18 +180,24 @@ fn check(
     let width_px = f64::from(candidates.width_px);
     let none = usual_px > SEVERAL * alone_px && usual_px > LARGEST_SHARE * width_px;
     if none || 2 * members.len() <= total {
-        let mut bad: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
+        let missed_px = |i: usize| misfits[i].map_or(f64::NAN, |(px, _)| px);
+        let fits = |i: usize| missed_px(i) <= SEVERAL * alone_px;
+        // Beside a rig that no few pairs fit, what undoes a pair's misfit does so by chance.
+        let is_rig = !none || members.iter().filter(|&&i| fits(i)).count() >= candidates.fewest_pairs;
+        let is_told = |pair: &&DiscardedPair| is_rig || matches!(pair.cause, Cause::Duplicate | Cause::Misread);
+        let mut bad: Vec<Skipped> = discarded.iter().filter(is_told).map(DiscardedPair::skipped).collect();
         let agreeing = if none { 0 } else { members.len() };
         if none {
-            let missed = |&i: &usize| {
-                let missed_px = misfits[i].map_or(f64::NAN, |(px, _)| px);
-                let reason = match missed_px <= SEVERAL * alone_px {
+            let missed = |i: usize| {
+                let reason = match fits(i) {
                     true => "fits a rig that the others do not fit".to_owned(),
-                    false => format!("misses the rig of all by {missed_px:.1} px"),
+                    false => format!("misses the rig of all by {:.1} px", missed_px(i)),
                 };
                 Skipped { pair: candidates.views[i].pair.clone(), reason }
             };
-            bad.extend(members.iter().map(missed));
+            let is_open = |i: &usize| bad.iter().all(|told| told.pair != candidates.views[*i].pair);
+            let open: Vec<usize> = (0..total).filter(is_open).collect();
+            bad.extend(open.into_iter().map(missed));
             bad.sort_by(|a, b| a.pair.cmp(&b.pair));
         }
         return Err(Error::Contradiction { agreeing, total, usual_px, alone_px, bad });
