@@ -103,7 +103,11 @@ impl<'a> Table<'a> {
             _ => {
                 let message = format!("`{}` is not a number: `{}`", self.header[column], &row[column]);
                 let decimal_comma = row[column].replacen(',', ".", 1).parse::<f64>().is_ok();
-                Err(self.refuse_with(line, message, decimal_comma.then_some("write numbers with a decimal point")))
+                let hint = match row[column].trim().is_empty() {
+                    true => Some("a row that was not measured is left out"),
+                    false => decimal_comma.then_some("write numbers with a decimal point"),
+                };
+                Err(self.refuse_with(line, message, hint))
             }
         }
     }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::check::{Advice, Check};
 use super::corrections::{CouplingTerm, GravityTerm, HarmonicTerm, LoadPoint, Wave};
 use super::{Corrections, Ends, Error, Joint, Result, Robot};
-use crate::diagnostic::Place;
+use crate::diagnostic::{Place, short};
 use crate::files;
 use crate::geometry::{Transform, rotation_vector, transform};
 
@@ -157,7 +157,19 @@ pub fn read_checked(path: &Utf8Path) -> Result<(Robot, Option<Check>)> {
     let hint = "`stereocal robot new NAME` writes the robot file of a common arm, `robot import` that of a URDF or table, `identify` identified.toml";
     let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
     let refuse = |message| Error::File { message, place: Place { path: path.to_owned(), line: None } };
-    Ok((record.robot().map_err(refuse)?, record.check))
+    let robot = record.robot().map_err(refuse)?;
+    in_metres(&robot).map_or(Ok(()), |message| Err(refuse(message)))?;
+    Ok((robot, record.check))
+}
+
+/// That the links are no arm's in mm. An arm whose joints all turn reaches as far as its links are long.
+fn in_metres(robot: &Robot) -> Option<String> {
+    /// Far below what any arm reaches, and far above what it reaches in metres, mm.
+    const LEAST_MM: f64 = 10.0;
+    let (reach_mm, slides) = (robot.reach_mm(), robot.joints.iter().any(|joint| joint.slides));
+    (!slides && (f64::MIN_POSITIVE..LEAST_MM).contains(&reach_mm)).then(|| {
+        format!("all links together are {} mm long: lengths are in mm here, and these seem to be in m", short(reach_mm))
+    })
 }
 
 /// The file of the robot that `identify` found.

@@ -178,7 +178,7 @@ fn another_file_of_the_program() {
     refused(&["identify", "--robot", "m.csv"], &table, 2, &["this is a table, and TOML is needed", "robot new NAME"]);
     let robot = [(
         "robot.toml",
-        "name = \"r\"\nconvention = \"mdh\"\n[[joint]]\nalpha_deg = 0.0\na_mm = 0.0\ntheta_deg = 0.0\nd_mm = 1.0\n",
+        "name = \"r\"\nconvention = \"mdh\"\n[[joint]]\nalpha_deg = 0.0\na_mm = 0.0\ntheta_deg = 0.0\nd_mm = 100.0\n",
     )];
     refused(
         &["measure", "x", "--calibration", "robot.toml"],

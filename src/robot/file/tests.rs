@@ -49,3 +49,19 @@ fn a_joint_that_the_robot_lacks_is_refused() {
     let message = toml::from_str::<RobotRecord>(&text).unwrap().robot().unwrap_err();
     assert!(message.contains("joint 7 of a robot with 6"), "{message}");
 }
+
+#[test]
+fn links_in_metres_are_named_and_an_axis_without_length_is_none() {
+    let read = |robot: &Robot| {
+        let (_keep, path) = files::temporary("robot.toml", to_toml(robot));
+        read(&path)
+    };
+    let mut robot = Robot::paper();
+    for joint in &mut robot.joints {
+        (joint.a_mm, joint.d_mm) = (joint.a_mm / 1000.0, joint.d_mm / 1000.0);
+    }
+    let message = read(&robot).unwrap_err().to_string();
+    assert!(message.contains("lengths are in mm here, and these seem to be in m"), "{message}");
+    robot.joints.iter_mut().for_each(|joint| joint.slides = true);
+    assert!(read(&robot).is_ok());
+}
