@@ -71,7 +71,8 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json {
         json
     } else {
-        report::identify::summary(&record, (file.as_deref(), &nominal), placed.is_some(), &out)
+        let identified = &found.candidates[found.chosen].robot;
+        report::identify::summary(&record, (file.as_deref(), &nominal, identified), placed.is_some(), &out)
     };
     let status = record.check().status();
     Ok(Outcome { stdout, status })

@@ -13,12 +13,12 @@ use crate::cli::Measure;
 use crate::config::Config;
 use crate::diagnostic::{Status, count};
 use crate::files::OutDir;
-use crate::files::provenance::Run;
+use crate::files::provenance::{Provenance, Run, are_among};
 use crate::formats::calibration::{self, Calibrated};
 use crate::formats::measure::{self, MeasureFile};
 use crate::imaging::corners::named;
 use crate::imaging::input::cache::Cache;
-use crate::imaging::input::pairs::Source;
+use crate::imaging::input::pairs::{PairFiles, Source};
 use crate::imaging::{Corners, PairCorners, Wanted, find_corners};
 use crate::measurements::{self, RobotPose};
 use crate::report::measure::Extras;
@@ -51,6 +51,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let wanted = Wanted { board: known.board, needed: 1, mosaic: args.bayer, cache, overlays };
     let pairing = source.pairs(&out)?;
     progress::note(&pairing.taken);
+    calibrated_by(&pairing.pairs, &rig_file).iter().for_each(progress::note);
     let corners = find_corners(&pairing, &wanted)?;
     known.rig.check_size(&corners)?;
     // As it is seen: of a grid of tags whose it is, and how far black has spread.
@@ -78,6 +79,18 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
     let status = if series.judgement.leaves_open(known.tolerance_mm) { Status::OutOfTolerance } else { status };
     Ok(Outcome { stdout, status })
+}
+
+/// That pictures are those of the calibration, which agree with the rig whatever it is.
+fn calibrated_by(pairs: &[PairFiles], rig_file: &Utf8Path) -> Option<String> {
+    let known = Provenance::pictures_of(rig_file);
+    let own = pairs.iter().filter(|pair| are_among(&known, [&pair.left, &pair.right])).count();
+    (own > 0).then(|| {
+        format!(
+            "{own} of {} calibrated this rig: that they agree with it shows nothing of how well it measures others",
+            count(pairs.len(), "pair")
+        )
+    })
 }
 
 /// Where the poses are: in the folder of the pictures; of two folders in the one that holds both, else in one of them.

@@ -2,6 +2,7 @@
 
 use camino::Utf8Path;
 
+use crate::diagnostic::count as counted;
 use crate::files::OutDir;
 use crate::formats::placements::record::PLACEMENT;
 use crate::identify::judge::errors::Spread;
@@ -19,10 +20,10 @@ const NARROW_DEG: f64 = 30.0;
 const HALF_A_TURN_DEG: f64 = 180.0;
 
 /// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written,
-/// and what to do with it. `robot` is the nominal robot with its file.
+/// and what to do with it. `robot` is the file of the nominal robot, which comes before the identified one.
 pub fn summary(
     record: &Record,
-    (robot, nominal): (Option<&Utf8Path>, &Robot),
+    (robot, nominal, identified): (Option<&Utf8Path>, &Robot, &Robot),
     is_placed: bool,
     out: &OutDir,
 ) -> String {
@@ -50,7 +51,8 @@ pub fn summary(
     let placement = if is_placed { format!(", {}", out.join(PLACEMENT)) } else { String::new() };
     let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
     lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
-    lines.push(format!("next: {}", next(record, robot.map_or("ROBOT", Utf8Path::as_str), file.as_str())));
+    let of_links = identified.corrections.is_empty();
+    lines.push(format!("next: {}", next(record, robot.map_or("ROBOT", Utf8Path::as_str), (file.as_str(), of_links))));
     lines.join("\n") + "\n"
 }
 
@@ -70,11 +72,15 @@ pub(super) fn advice(record: &Record) -> String {
     }
 }
 
-/// What to do with the robot that was found in `file`.
-fn next(record: &Record, robot: &str, file: &str) -> String {
+/// What to do with the robot that was found in `file`, which may be one of links alone.
+fn next(record: &Record, robot: &str, (file, of_links): (&str, bool)) -> String {
     match record.advice {
         Advice::Use => format!(
-            "`stereocal compensate TARGETS --robot {robot} --identified {file}`, or `stereocal export robot --robot {file} --format urdf`"
+            "`stereocal compensate TARGETS --robot {robot} --identified {file}`, or {}",
+            match of_links {
+                true => format!("`stereocal export robot --robot {file} --format urdf`"),
+                false => "`identify --extensions none` first for a URDF, which holds links alone".to_owned(),
+            }
         ),
         Advice::Check => format!(
             "look at what is named above; ten new poses say whether it holds: `stereocal verify --measurements NEW.csv --robot {robot} --robot {file}`"
@@ -148,11 +154,11 @@ pub(super) fn errors(spread: &PointSpread, mm: fn(f64) -> String) -> String {
 pub(super) fn judged_on(record: &Record) -> String {
     let before = record.before.judged();
     let count = before.distance.count.max(before.point.map_or(0, |p| p.count));
-    let without = record.strays.join(", ");
+    let (rows, without) = (counted(count, "row"), record.strays.join(", "));
     match (record.folded, record.strays.is_empty()) {
-        (true, _) => format!("{count} rows, each in a fit without it"),
-        (false, true) => format!("{count} rows that took no part in the fit"),
-        (false, false) => format!("{count} rows that took no part in the fit, without {without}"),
+        (true, _) => format!("{rows}, each in a fit without it"),
+        (false, true) => format!("{rows} that took no part in the fit"),
+        (false, false) => format!("{rows} that took no part in the fit, without {without}"),
     }
 }
 
