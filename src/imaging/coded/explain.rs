@@ -113,7 +113,9 @@ fn other_markers(
     let mut best: Option<(usize, Dictionary, Fields, Vec<Read>)> = None;
     for fields in all_fields(board.pitch(), std::iter::once(own.share).chain(SHARES)) {
         let reads = markers_in(picture, grid, board.pitch(), fields);
-        for other in Dictionary::all().filter(|other| other.bits() == fields.bits) {
+        // The board's own first: others begin with the same markers.
+        let all = std::iter::once(dictionary).chain(Dictionary::all());
+        for other in all.filter(|other| other.bits() == fields.bits) {
             let known = known_in(other, &reads);
             if known >= FEWEST && 2 * known > reads.len() && best.as_ref().is_none_or(|(most, ..)| known > *most) {
                 best = Some((known, other, fields, reads.clone()));
