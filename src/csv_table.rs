@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
                 let message = format!("`{}` is not a number: `{}`", self.header[column], &row[column]);
                 let decimal_comma = row[column].replacen(',', ".", 1).parse::<f64>().is_ok();
                 let hint = match row[column].trim().is_empty() {
-                    true => Some("a row that was not measured is left out"),
+                    true => Some("leave the row out where nothing was measured"),
                     false => decimal_comma.then_some("write numbers with a decimal point"),
                 };
                 Err(self.refuse_with(line, message, hint))

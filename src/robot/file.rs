@@ -158,8 +158,10 @@ pub fn read_checked(path: &Utf8Path) -> Result<(Robot, Option<Check>)> {
     let record: RobotRecord = files::read_toml(path, "robot file", Some(hint))?;
     let refuse = |message| Error::File { message, place: Place { path: path.to_owned(), line: None } };
     let robot = record.robot().map_err(refuse)?;
-    in_metres(&robot).map_or(Ok(()), |message| Err(refuse(message)))?;
-    Ok((robot, record.check))
+    match in_metres(&robot) {
+        Some(message) => Err(refuse(message)),
+        None => Ok((robot, record.check)),
+    }
 }
 
 /// That the links are no arm's in mm. An arm whose joints all turn reaches as far as its links are long.

@@ -2,16 +2,17 @@
 //! a picture that failed, or a line of joint angles that was lost.
 //!
 //! In: points in the order of the file, and the nominal robot. Out: the set with each reading at the row that it is of,
-//! from which row on, and by how many rows. Every row and every shift by up to `MOST` is tried with the links of the
-//! file, placements and the target's place fitted (least sum of distances, by reweighting). A shift is named where the
-//! rows behind it come nearer by a factor, the likelihood of all rows pays for the search, and another placement of
-//! these rows does not explain them as well. Name, group and role of a row are those of its joint angles where pictures
-//! failed, and those of its point where joint angles were lost: where a group ends both are tried, and where neither is
-//! likelier by far these rows are left out. Points at equal joint angles that no instrument reads at one place are
-//! looked at as rows of their own. What goes wrong: groups of three rows or so, whose placements take up what is wrong;
-//! neighbouring poses that are nearer to each other than the nominal robot is to the readings; fewer than `FEWEST` rows
-//! behind the shift; rows that were left out between count as none; readings that were repeated at most poses of a
-//! table that is shifted count as rows of their own.
+//! from which row on, and by how many rows. Where readings are not all far nearer to their own rows than the next rows
+//! are, every row and every shift by up to `MOST` is tried with the links of the file, placements and the target's
+//! place fitted (least sum of distances, by reweighting). A shift is named where the rows behind it come nearer by a
+//! factor, the likelihood of all rows pays for the search, and another placement of these rows does not explain them as
+//! well. Name, group and role of a row are those of its joint angles where pictures failed, and those of its point
+//! where joint angles were lost: where a group ends both are tried, and where neither is likelier by far these rows are
+//! left out. Points at equal joint angles that no instrument reads at one place are looked at as rows of their own.
+//! What goes wrong: groups of three rows or so, whose placements take up what is wrong; neighbouring poses that are
+//! nearer to each other than the nominal robot is to the readings; fewer than `FEWEST` rows behind the shift; rows that
+//! were left out between count as none; readings that were repeated at most poses of a table that is shifted count as
+//! rows of their own.
 
 mod rows;
 

@@ -182,7 +182,7 @@ fn check(
     if none || 2 * members.len() <= total {
         let missed_px = |i: usize| misfits[i].map_or(f64::NAN, |(px, _)| px);
         let fits = |i: usize| missed_px(i) <= SEVERAL * alone_px;
-        // Beside a rig that no few pairs fit, what undoes a pair's misfit does so by chance.
+        // What undoes a pair's misfit does so by chance where hardly a pair fits the rig.
         let is_rig = !none || members.iter().filter(|&&i| fits(i)).count() >= candidates.fewest_pairs;
         let is_told = |pair: &&DiscardedPair| is_rig || matches!(pair.cause, Cause::Duplicate | Cause::Misread);
         let mut bad: Vec<Skipped> = discarded.iter().filter(is_told).map(DiscardedPair::skipped).collect();

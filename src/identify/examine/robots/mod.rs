@@ -251,7 +251,7 @@ impl Table {
     /// The stretches of rows that are of different robots.
     fn stretches(&self) -> Option<Judged> {
         let mut parts: Vec<Vec<usize>> = vec![(0..self.rows.len()).collect()];
-        // Of rows that one robot explains nothing can be cut off.
+        // What one robot leaves of all rows is more than in any parts: where that is little no cut is judged.
         if self.points.together(&parts, &self.points.without_gross(&parts)).scatter_mm() < REPEATABILITY_MM {
             return None;
         }
