@@ -143,6 +143,12 @@ fn a_rig_that_stands_is_valid_and_one_that_turned_is_named_with_a_history() {
     assert_eq!(status, Some(0), "{said}{messages}");
     assert!(said.starts_with("STILL VALID: no change beyond chance; 3 pairs would have shown"), "{said}");
     assert!(!said.split_whitespace().any(|word| ["0.0000", "-0.0000"].contains(&word)), "{said}");
+    // A size of squares that is not the board's is no change of the rig.
+    let other = ["--against", "before/calibration.json", "--square-mm", "12", "--out", "other"];
+    let other = stereocal(at, &[&["camera-check", "--corners", "three.csv"], &other[..]].concat());
+    assert_eq!(other.status.code(), Some(2), "{}{}", stdout(&other), stderr(&other));
+    assert!(stderr(&other).contains("not where they are of 12 mm as is said"), "{}", stderr(&other));
+    assert!(!at.join("other/recheck.json").exists());
     let focal = json(&at.join("before/calibration.json"))["right"]["fx"].as_f64().unwrap();
     turned(at, "three.csv", "turned.csv", focal, 0.01);
     let (status, said, messages) = check("turned.csv");

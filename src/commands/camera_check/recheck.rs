@@ -16,7 +16,7 @@ use crate::imaging::corners::named;
 use crate::imaging::input::cache::Cache;
 use crate::imaging::input::corners_csv;
 use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
-use crate::imaging::{Corners, Wanted, find_corners};
+use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::pairs::open_numbers;
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
@@ -54,9 +54,12 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let warnings: Vec<String> =
         calibrated.doubts().into_iter().chain(other_size(&calibrated, &corners)).chain(of_own).collect();
     warnings.iter().for_each(progress::warn);
-    let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, .. } = calibrated;
+    let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, board, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
     let mut found = recheck::recheck(&before, &corners)?;
+    if found.change.is_some() {
+        check_squares(&before, &corners, board)?;
+    }
     // As of a change, what moves a length by less is nothing to act on; and what the calibration's own pairs scatter by
     // is in its uncertainty.
     let all_own = args.corners.is_some() && whole.is_some();
@@ -79,14 +82,33 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
 
 /// Where the board is said to be of another size than the one that calibrated.
 fn other_size(calibrated: &Calibrated, corners: &Corners) -> Option<String> {
-    let (then, now) = (calibrated.board?, corners.board);
-    let differ = then.squares == now.squares && then.square_mm != now.square_mm;
-    differ.then(|| {
-        format!(
-            "the calibration was made with squares of {} mm, and {} mm are said now: if it is the same board, leave `--square-mm` away",
-            then.square_mm, now.square_mm
-        )
-    })
+    let then = of_other_size(calibrated.board?, &corners.board)?;
+    Some(format!(
+        "the calibration was made with squares of {} mm, and {} mm are said now: if it is the same board, leave `--square-mm` away",
+        then.square_mm, corners.board.square_mm
+    ))
+}
+
+/// The board that calibrated, where it has as many squares of another size.
+fn of_other_size(then: Board, now: &Board) -> Option<Board> {
+    (then.squares == now.squares && then.square_mm != now.square_mm).then_some(then)
+}
+
+/// Pairs that contradict the rig with the squares that are said, and agree with it with those that calibrated, show no
+/// change: they are of the board that calibrated.
+fn check_squares(before: &Before, corners: &Corners, calibrated: Option<Board>) -> Result<()> {
+    let said = corners.board;
+    let Some(board) = calibrated.and_then(|then| of_other_size(then, &said)) else { return Ok(()) };
+    let stands =
+        recheck::recheck(before, &Corners { board, ..corners.clone() }).is_ok_and(|found| found.change.is_none());
+    if !stands {
+        return Ok(());
+    }
+    let message = format!(
+        "the pairs agree with the calibration where the squares are of {} mm, as they were when it was made, and not where they are of {} mm as is said",
+        board.square_mm, said.square_mm
+    );
+    Err(config::Error::Usage { message, hint: "leave `--square-mm` away".to_owned() }.into())
 }
 
 /// Pairs of pictures that the calibration was made of, among those that are to say whether it still holds.

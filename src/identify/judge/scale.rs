@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::model::ladder::{Chain, Terms};
 use crate::identify::model::prior::{Tolerance, weighed};
@@ -98,10 +99,14 @@ impl CommonScale {
     pub fn sentence(&self) -> String {
         let CommonScale { share, sigma, unseen, of, .. } = *self;
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
+        let odds = (self.log_odds < TOLD_APART).then(|| format!(" (odds of {:.0} to 1)", self.log_odds.exp()));
+        let are = if odds.is_some() { "may be" } else { "are" };
         match self.is_significant() {
             true => format!(
-                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} are scaled, along all axes or one, or the lengths of the robot file",
-                100.0 * sigma
+                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} {are} scaled, along all axes or one, or the lengths of the robot \
+                 file{}",
+                100.0 * sigma,
+                odds.unwrap_or_default()
             ),
             false => format!(
                 "a scale error of the {of} of up to {:.2} % cannot be told from a robot of another size",
