@@ -1,7 +1,7 @@
 //! `calibration.json`: a rig as a file.
 
 use camino::{Utf8Path, Utf8PathBuf};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
@@ -104,6 +104,8 @@ pub struct Calibrated {
     pub farthest_pair: Option<f64>,
     /// How many pairs with poses of their own made the rig.
     pub pairs: Option<usize>,
+    /// Variances of the six numbers of `right_from_left` from pair to pair, rad^2 and mm^2.
+    pub pair_motion: Option<Vector6<f64>>,
     /// The volume that the verdict was for.
     pub volume: Option<Volume>,
     pub check: Option<Check>,
@@ -158,6 +160,17 @@ struct NoiseRecord {
     /// How many pairs with poses of their own say so.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pairs: Option<usize>,
+    /// Standard deviations of the six numbers of `right_from_left` from pair to pair, in the covariance's order: rad
+    /// and mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pair_motion: Option<[f64; 6]>,
+}
+
+impl NoiseRecord {
+    fn pair_motion(&self) -> Option<Vector6<f64>> {
+        let sigmas = self.pair_motion.filter(|sigmas| sigmas.iter().all(|s| s.is_finite() && *s > 0.0))?;
+        Some(Vector6::from(sigmas.map(|sigma| sigma * sigma)))
+    }
 }
 
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
@@ -261,6 +274,7 @@ impl CalibrationFile {
             pair_excess: Some(pair_excess(calibration)),
             farthest_pair: farthest_pair(calibration),
             pairs: Some(calibration.pair_scatter.groups),
+            pair_motion: calibration.pair_motion().map(|[variances, _]| variances.map(f64::sqrt).into()),
         });
         self.boards = Some(BoardsRecord { nearest_mm, farthest_mm });
         self.board = Some(calibration.board.to_string());
@@ -371,6 +385,7 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
         pair_excess: file.corner_noise.and_then(|n| n.pair_excess).filter(|e| *e >= 1.0),
         farthest_pair: file.corner_noise.and_then(|n| n.farthest_pair),
         pairs: file.corner_noise.and_then(|n| n.pairs),
+        pair_motion: file.corner_noise.and_then(|n| n.pair_motion()),
         board: file.board.as_ref().and_then(|name| name.parse().ok()),
         volume: file.volume,
         check: file.check,

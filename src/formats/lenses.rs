@@ -63,6 +63,7 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
     let mut known = KnownLenses::of_rig(&read.rig, &sides);
     known.pairs = read.pairs;
     known.noise = read.noise;
+    known.pair_motion = read.pair_motion.filter(|_| known.both());
     known.pair_excess = read.pair_excess.unwrap_or(1.0);
     Ok(known)
 }

@@ -4,7 +4,7 @@
 //! pairs that were not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell
 //! the cameras.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::print_share;
@@ -18,8 +18,9 @@ use crate::stereo::select::known_lenses::{self, LensCheck};
 use crate::stereo::select::lens_ladder;
 use crate::stereo::select::model_comparison::LensScore;
 use crate::stereo::select::options::{Choice, Options};
+use crate::stereo::select::pair_motion;
 use crate::stereo::select::pair_scatter::PairScatter;
-use crate::stereo::select::stated_uncertainty::{self, Witness};
+use crate::stereo::select::stated_uncertainty::{self, Stated, Witness};
 use crate::stereo::solve::{Priors, Problem, Solved, Spread};
 use crate::stereo::{Error, Lens, Rig};
 
@@ -118,10 +119,13 @@ impl Calibration {
 
     /// Moves the rig by a step of the shared numbers, and the boards with it.
     pub fn move_rig(&mut self, step: &DVector<f64>) {
-        self.values.shared = self.layout.step(&self.values.shared, step.as_slice());
-        for (pose, view) in self.values.poses.iter_mut().zip(&self.views) {
-            *pose = board_pose::follow(&self.values.shared, view, *pose).unwrap_or(*pose);
-        }
+        board_pose::move_shared(&mut self.values, &self.views, &self.layout, step);
+    }
+
+    /// Variances of the six numbers of `right_from_left` from pair to pair, rad^2 and mm^2, and those by which a pair
+    /// usually tells them; see [`pair_motion`].
+    pub fn pair_motion(&self) -> Option<[Vector6<f64>; 2]> {
+        pair_motion::of_pairs(&self.problem().equations(&self.layout)?, &self.layout, self.inflation)
     }
 
     /// The pairs with the values reached, to solve again in part or with another model.
@@ -200,12 +204,13 @@ fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool)
     let print = print_share(&solved, &corners.board, &layout);
     let spread = corners.board.is_grid().then(|| Spread::of(&solved.problem, &layout)).flatten();
     let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
-    let (mut covariance, pair_scatter, witnesses) =
-        stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
+    let stated = stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
+    let Stated { mut covariance, pair_scatter, witnesses, weighed } = stated;
     if let Some(spread) = &spread {
         covariance += spread.covariance(inflation);
     }
-    let Problem { views, mut values, priors } = solved.problem;
+    let Problem { views, values, priors } = solved.problem;
+    let mut values = weighed.unwrap_or(values);
     let mut own_noise = solved.noise;
     if let Some(print) = print {
         covariance += print.covariance - without_scatter;

@@ -95,3 +95,25 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
     let open = doubts(Some((Verdict::Undecided, None)), &["0017"]);
     assert!(open.contains("from pair 0017 on") && open.ends_with("can be trusted is not known"), "{open}");
 }
+
+#[test]
+fn how_pairs_moved_is_read_where_it_is_said() {
+    let (_keep, path) = files::temporary("calibration.json", "");
+    let motion = |sigmas: Option<[f64; 6]>| {
+        let noise = NoiseRecord {
+            factor: 1.0,
+            added_px: 0.0,
+            pair_excess: None,
+            farthest_pair: None,
+            pairs: Some(12),
+            pair_motion: sigmas,
+        };
+        let file = CalibrationFile { corner_noise: Some(noise), ..CalibrationFile::from(&plain()) };
+        std::fs::write(&path, files::to_json(&file)).unwrap();
+        read(&path).unwrap().pair_motion
+    };
+    assert_eq!(motion(None), None);
+    let sigmas = [0.5, 0.25, 2.0, 1.0, 4.0, 8.0];
+    assert_eq!(motion(Some(sigmas)), Some(Vector6::from(sigmas.map(|sigma| sigma * sigma))));
+    assert_eq!(motion(Some([0.5, 0.25, 0.0, 1.0, 4.0, 8.0])), None);
+}

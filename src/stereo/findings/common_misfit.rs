@@ -24,7 +24,6 @@ use crate::stereo::data::{View, in_use};
 use crate::stereo::init::board_pose::{as_one_board, as_two_boards, misfit_px, times_alone};
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::{Cause, Missed, TIMES};
-use crate::stereo::select::pair_motion;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem};
 
@@ -107,10 +106,9 @@ struct Misfit {
 
 /// Pictures that were not taken at one moment: neither the corners nor a lens explain so much.
 fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
-    let equations = calibration.problem().equations(&calibration.layout);
-    let variances = equations.and_then(|all| pair_motion::of_pairs(&all, &calibration.layout, calibration.inflation));
-    let size =
-        variances.map(|[v, _]| [v.fixed_rows::<3>(3).sum().sqrt(), v.fixed_rows::<3>(0).sum().sqrt().to_degrees()]);
+    let size = calibration
+        .pair_motion()
+        .map(|[v, _]| [v.fixed_rows::<3>(3).sum().sqrt(), v.fixed_rows::<3>(0).sum().sqrt().to_degrees()]);
     let otherwise = size.map_or(String::new(), |[mm, deg]| {
         format!(
             "the board (or a camera) moved between the two, so that from pair to pair the cameras seem to stand otherwise by {mm:.2} mm and \

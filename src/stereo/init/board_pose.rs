@@ -4,7 +4,7 @@
 //! undistorted rays, then a bundle of the pose alone over both pictures; the better end wins. Goes wrong: too few
 //! corners, corners on a line.
 
-use nalgebra::Matrix2;
+use nalgebra::{DVector, Matrix2};
 
 use crate::geometry::Transform;
 use crate::imaging::Side;
@@ -90,6 +90,14 @@ pub fn refit(shared: &Shared, view: &View, known: Transform) -> Option<Transform
 /// The pose of a pair on a rig that hardly differs from one on which the pose is known.
 pub fn follow(shared: &Shared, view: &View, known: Transform) -> Option<Transform> {
     Some(search(shared, view, known, Loss::Squared, Search::TRIAL)?.0)
+}
+
+/// Moves the shared numbers by a step, and the boards with them.
+pub fn move_shared(values: &mut Values, views: &[View], layout: &Layout, step: &DVector<f64>) {
+    values.shared = layout.step(&values.shared, step.as_slice());
+    for (pose, view) in values.poses.iter_mut().zip(views) {
+        *pose = follow(&values.shared, view, *pose).unwrap_or(*pose);
+    }
 }
 
 fn best(shared: &Shared, view: &View, loss: Loss) -> Option<(Transform, f64)> {

@@ -5,7 +5,7 @@
 //! numbers that are known, what they are expected to be, and how surely. Goes wrong: a covariance that is singular;
 //! then the cameras' own tolerance is taken.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::imaging::{Corners, Side};
 use crate::linear_algebra::to_unit_diagonal;
@@ -32,6 +32,9 @@ pub struct KnownLenses {
     pub pairs: Option<usize>,
     /// How corners scattered there, where it says so.
     pub noise: Option<Noise>,
+    /// Variances of the six numbers of `right_from_left` from pair to pair there, rad^2 and mm^2, where both lenses are
+    /// those of one rig that says so.
+    pub pair_motion: Option<Vector6<f64>>,
 }
 
 impl KnownLenses {
@@ -59,6 +62,7 @@ impl KnownLenses {
             pair_excess: 1.0,
             pairs: None,
             noise: None,
+            pair_motion: None,
         };
         let sigmas = known.numbers().into_iter().map(|(side, at)| {
             let camera = known.cameras[side as usize].as_ref();
@@ -88,6 +92,7 @@ impl KnownLenses {
         both.pair_excess = self.pair_excess.max(other.pair_excess);
         both.pairs = other.pairs.or(self.pairs);
         both.noise = other.noise.or(self.noise);
+        both.pair_motion = other.pair_motion;
         both
     }
 

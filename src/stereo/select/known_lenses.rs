@@ -19,6 +19,7 @@ use crate::stereo::model::{KnownLenses, Layout};
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::model_comparison::{Trial, gain_of_terms};
 use crate::stereo::select::options::{Choice, KnownScatter, Options, SIMPLEST};
+use crate::stereo::select::pair_motion::KnownMotion;
 use crate::stereo::select::stated_uncertainty;
 use crate::stereo::solve::Problem;
 use crate::stereo::{Error, Rig};
@@ -83,7 +84,7 @@ pub fn choose(start: &Problem, known: &KnownLenses, options: &Options) -> Result
         layout: known.layout(lens, shape),
         near: Some(problem.values),
         priors: solved.problem.priors,
-        scatter: Some(KnownScatter { lenses: scatter, pairs: scatter }),
+        scatter: Some(KnownScatter { lenses: scatter, pairs: scatter, motion: motion(start, known) }),
         scores: Vec::new(),
     })
 }
@@ -97,6 +98,12 @@ fn start_of(start: &Problem, known: &KnownLenses) -> Problem {
         }
     }
     problem
+}
+
+/// How the pairs move, where more of them told that before than there are now.
+fn motion(start: &Problem, known: &KnownLenses) -> Option<KnownMotion> {
+    let (variances, pairs) = known.pair_motion.zip(known.pairs)?;
+    (pairs > start.views.len()).then_some(KnownMotion { variances, pairs })
 }
 
 /// Whether the evidence for a board that is bent is larger than for a flat one.

@@ -2,6 +2,7 @@
 
 use crate::stereo::model::{KnownLenses, Layout, Values};
 use crate::stereo::select::model_comparison::{LensScore, Trial};
+use crate::stereo::select::pair_motion::KnownMotion;
 use crate::stereo::solve::{Priors, Problem, Solved};
 use crate::stereo::{Error, Lens};
 
@@ -27,6 +28,8 @@ pub struct KnownScatter {
     pub lenses: f64,
     /// So much the pairs scatter at least: an earlier calibration may have had more of them, and know it better.
     pub pairs: f64,
+    /// How the link of the two pictures moved from pair to pair of an earlier calibration that had more of them.
+    pub motion: Option<KnownMotion>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

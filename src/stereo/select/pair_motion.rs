@@ -1,22 +1,41 @@
-//! How far the link of the two pictures is off the common rig from pair to pair, and what that does to the shared
-//! numbers.
+//! How far the link of the two pictures is off the common rig from pair to pair, what that does to the shared numbers,
+//! and the rig of a few pairs whose motion is known.
 //!
-//! In: the normal equations of all pairs at their minimum. Out: the covariance of the shared numbers by that motion
-//! alone. Method: of a board that is held by hand before cameras that are not triggered together, or of a right camera
-//! that is not clamped, each pair has a small motion of its own, drawn with a variance for each of the six numbers of
-//! `right_from_left`; the variances are the likeliest ones (expectation and maximisation, Dempster, Laird and Rubin
-//! 1977), and reach the shared numbers through the normal equations of the pairs. Goes wrong: pairs that do not tell
-//! the motion from their noise; its variances are then small.
+//! In: the normal equations of all pairs at their minimum. Out: the variances of that motion, and the covariance of the
+//! shared numbers by it alone. Method: of a board that is held by hand before cameras that are not triggered together,
+//! or of a right camera that is not clamped, each pair has a small motion of its own, drawn with a variance for each of
+//! the six numbers of `right_from_left`; the variances are the likeliest ones (expectation and maximisation, Dempster,
+//! Laird and Rubin 1977), and reach the shared numbers through the normal equations of the pairs. Many pairs tell them,
+//! a few do not; where an earlier calibration of the cameras did, a few pairs are weighed by them (generalised least
+//! squares), so that what the board's motion hides of a pair does not count as if the corners told it. Goes wrong:
+//! pairs that do not tell the motion from their noise; its variances are then small.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use crate::stereo::model::Layout;
+use crate::stereo::init::board_pose;
+use crate::stereo::model::{Layout, Values};
+use crate::stereo::solve::Problem;
 use crate::stereo::solve::normal_equations::{Block, Equations};
 use crate::stereo::solve::uncertainty::invert;
 
 /// Rounds after which variances that are there have settled, and those that are not have fallen to a few hundredths of
 /// what the noise hides.
 const ROUNDS: usize = 100;
+
+/// Chance that pairs which move as is known are said not to.
+const CHANCE: f64 = 1e-3;
+
+/// Steps of the weighed rig: the equations are nearly straight over what pairs move by.
+const STEPS: usize = 2;
+
+/// Variances of the six numbers of `right_from_left` from pair to pair, rad^2 and mm^2, as so many pairs of an earlier
+/// calibration told them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownMotion {
+    pub variances: Vector6<f64>,
+    pub pairs: usize,
+}
 
 /// What a pair tells of the shared numbers and of its own motion, in units of the noise: the information of the shared
 /// ones and their gradient.
@@ -49,14 +68,109 @@ pub fn of_pairs(equations: &Equations, layout: &Layout, inflation: f64) -> Optio
 /// What each pair tells, and the variances of the six numbers.
 fn told(equations: &Equations, layout: &Layout, inflation: f64) -> Option<(Vec<Told>, Vector6<f64>)> {
     let at = layout.transform.then(|| layout.transform_start())?;
+    let (pairs, prior) = in_units_of_noise(equations, inflation)?;
+    let variances = variances(&pairs, &prior, at)?;
+    Some((pairs, variances))
+}
+
+/// What each pair tells, and what is expected.
+fn in_units_of_noise(equations: &Equations, inflation: f64) -> Option<(Vec<Told>, Told)> {
     let told = |block: &Block| {
         let (matrix, gradient) = block.reduced(0.0)?;
         Some(Told { matrix: matrix / inflation, gradient: gradient / inflation })
     };
     let pairs = equations.blocks.iter().map(told).collect::<Option<Vec<Told>>>()?;
     let prior = Told { matrix: &equations.prior.matrix / inflation, gradient: &equations.prior.gradient / inflation };
-    let variances = variances(&pairs, &prior, at)?;
-    Some((pairs, variances))
+    Some((pairs, prior))
+}
+
+/// What the pairs tell of the shared numbers where each has a motion of its own with these variances.
+struct Weighed {
+    /// Of each pair's motion, where the shared numbers are known.
+    spreads: Vec<Matrix6<f64>>,
+    matrix: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl Weighed {
+    fn new(pairs: &[Told], at: usize, variances: &Vector6<f64>) -> Option<Weighed> {
+        let drawn = Matrix6::from_diagonal(&variances.map(|v| 1.0 / v));
+        let spreads = pairs.iter().map(|pair| (link(pair, at) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
+        let n = pairs.first()?.gradient.len();
+        let (mut matrix, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for (pair, spread) in pairs.iter().zip(&spreads) {
+            let through = pair.matrix.columns(at, 6) * spread;
+            matrix += &pair.matrix - &through * pair.matrix.rows(at, 6);
+            gradient += &pair.gradient - &through * pair.gradient.fixed_rows::<6>(at);
+        }
+        Some(Weighed { spreads, matrix, gradient })
+    }
+}
+
+/// The values that pairs with a known motion give, and the covariance of the shared numbers there. `problem` stands at
+/// its minimum without a motion, where its covariance is `stated`; what is expected counts in it `lenses` times as much
+/// as it is known to; `inflation` is as for [`covariance`]. `None` where the pairs move otherwise than is known, by
+/// more than chance: then nothing is known of how to weigh them.
+pub fn weighed(
+    problem: &Problem,
+    layout: &Layout,
+    inflation: f64,
+    lenses: f64,
+    known: &KnownMotion,
+    stated: &DMatrix<f64>,
+) -> Option<(Values, DMatrix<f64>)> {
+    let at = layout.transform.then(|| layout.transform_start())?;
+    let mut problem = problem.clone();
+    let (pairs, prior) = in_units_of_noise(&problem.equations(layout)?, inflation)?;
+    let excess = excess(&pairs, &prior, at, &known.variances, lenses, stated)?;
+    let mut covariance = None;
+    for _ in 0..STEPS {
+        let (pairs, prior) = in_units_of_noise(&problem.equations(layout)?, inflation)?;
+        let by_pairs = Weighed::new(&pairs, at, &known.variances)?;
+        let shared = invert(&(&by_pairs.matrix + &prior.matrix))?;
+        let step = -&shared * (&by_pairs.gradient + &prior.gradient);
+        if !moves_as_known(&pairs, at, &step, known) {
+            return None;
+        }
+        board_pose::move_shared(&mut problem.values, &problem.views, layout, &step);
+        covariance = Some(&shared * (by_pairs.matrix * excess + prior.matrix * lenses) * &shared);
+    }
+    Some((problem.values, covariance?))
+}
+
+/// By how much the covariance of `right_from_left` that is stated of pairs without a motion is larger than what noise
+/// and the motions let expect, at least one: pairs scatter by more than a motion with six variances says.
+fn excess(
+    pairs: &[Told],
+    prior: &Told,
+    at: usize,
+    variances: &Vector6<f64>,
+    lenses: f64,
+    stated: &DMatrix<f64>,
+) -> Option<f64> {
+    let own = invert(&pairs.iter().fold(prior.matrix.clone(), |sum, pair| sum + &pair.matrix))?;
+    let drawn = Matrix6::from_diagonal(variances);
+    let scatter = pairs.iter().fold(&prior.matrix * lenses, |sum, pair| {
+        let pull = pair.matrix.columns(at, 6);
+        sum + &pair.matrix + pull * drawn * pull.transpose()
+    });
+    let link = |covariance: &DMatrix<f64>| covariance.view((at, at), (6, 6)).into_owned();
+    let expected = link(&(&own * scatter * &own));
+    Some(((invert(&expected)? * link(stated)).trace() / 6.0).max(1.0))
+}
+
+/// Whether what the pairs leave of the link behind the step is chance where each moves as is known.
+fn moves_as_known(pairs: &[Told], at: usize, step: &DVector<f64>, known: &KnownMotion) -> bool {
+    let drawn = Matrix6::from_diagonal(&known.variances);
+    let of_pair = |pair: &Told| {
+        let link = link(pair, at);
+        let left = pair.gradient.fixed_rows::<6>(at) + pair.matrix.rows(at, 6) * step;
+        Some(left.dot(&((link + link * drawn * link).try_inverse()? * left)))
+    };
+    // The common link takes up the six numbers of one pair.
+    let [own, earlier] = [pairs.len(), known.pairs].map(|pairs| 6.0 * pairs.saturating_sub(1) as f64);
+    let chi_square: f64 = pairs.iter().map(|pair| of_pair(pair).unwrap_or(f64::INFINITY)).sum();
+    FisherSnedecor::new(own, earlier).map_or(true, |f| chi_square <= own * f.inverse_cdf(1.0 - CHANCE))
 }
 
 fn link(pair: &Told, at: usize) -> Matrix6<f64> {
@@ -75,16 +189,9 @@ fn variances(pairs: &[Told], prior: &Told, at: usize) -> Option<Vector6<f64>> {
     let count = pairs.len() as f64;
     let mut variances = by_noise(pairs, at);
     for _ in 0..ROUNDS {
-        let drawn = Matrix6::from_diagonal(&variances.map(|v| 1.0 / v));
-        let spreads = pairs.iter().map(|pair| (link(pair, at) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
-        let (mut matrix, mut gradient) = (prior.matrix.clone(), prior.gradient.clone());
-        for (pair, spread) in pairs.iter().zip(&spreads) {
-            let through = pair.matrix.columns(at, 6) * spread;
-            matrix += &pair.matrix - &through * pair.matrix.rows(at, 6);
-            gradient += &pair.gradient - &through * pair.gradient.fixed_rows::<6>(at);
-        }
-        let shared = invert(&matrix)?;
-        let step = -&shared * gradient;
+        let Weighed { spreads, matrix, gradient } = Weighed::new(pairs, at, &variances)?;
+        let shared = invert(&(matrix + &prior.matrix))?;
+        let step = -&shared * (gradient + &prior.gradient);
         let mut sum = Vector6::zeros();
         for (pair, spread) in pairs.iter().zip(&spreads) {
             let rows = pair.matrix.rows(at, 6);

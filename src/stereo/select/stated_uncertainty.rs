@@ -11,10 +11,11 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::statistics::chi_square_quantile;
 use crate::stereo::data::Noise;
-use crate::stereo::model::{Layout, Shared};
+use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::options::KnownScatter;
+use crate::stereo::select::pair_motion;
 use crate::stereo::select::pair_scatter::{Jackknife, PairScatter};
 use crate::stereo::solve::uncertainty::WORST_FOCAL_SIGMA;
 use crate::stereo::solve::{Problem, Solved};
@@ -38,9 +39,20 @@ pub struct Witness {
     step: DVector<f64>,
 }
 
+/// What is stated of a rig.
+pub struct Stated {
+    /// Of the shared numbers, in the layout's order.
+    pub covariance: DMatrix<f64>,
+    pub pair_scatter: PairScatter,
+    /// The richer models that are witnesses of another rig.
+    pub witnesses: Vec<Witness>,
+    /// The values, where the pairs were weighed by how they are known to move.
+    pub weighed: Option<Values>,
+}
+
 /// Enlarges the covariance `by_noise`, which is `inflation` times that of the normal equations, to what the numbers
-/// scatter by where lenses are `known` at least; with how the pairs scatter, and the richer models that are witnesses
-/// of another rig. `print_excess`: see [`Chance::print`](crate::stereo::select::model_comparison::Chance).
+/// scatter by where lenses are `known` at least, or finds the one of pairs whose motion is known. `print_excess`: see
+/// [`Chance::print`](crate::stereo::select::model_comparison::Chance).
 pub fn state(
     solved: &Solved,
     layout: &Layout,
@@ -49,12 +61,19 @@ pub fn state(
     scores: &[LensScore],
     known: Option<KnownScatter>,
     print_excess: f64,
-) -> (DMatrix<f64>, PairScatter, Vec<Witness>) {
+) -> Stated {
     let [lenses, pairs] = known.map_or([1.0; 2], |known| [known.lenses, known.pairs].map(|v| (v / inflation).max(1.0)));
     let Some((mut covariance, pair_scatter)) = scattered(solved, layout, &by_noise, inflation, [lenses, pairs]) else {
         let pair_scatter = PairScatter { groups: solved.problem.views.len(), ratio: None };
-        return (by_noise * lenses, pair_scatter, Vec::new());
+        return Stated { covariance: by_noise * lenses, pair_scatter, witnesses: Vec::new(), weighed: None };
     };
+    let motion = known.and_then(|known| known.motion);
+    let weighed =
+        motion.and_then(|m| pair_motion::weighed(&solved.problem, layout, inflation, lenses, &m, &covariance));
+    let weighed = weighed.map(|(values, by_motion)| {
+        covariance = by_motion;
+        values
+    });
     let factor = inflation * pair_scatter.ratio.unwrap_or(1.0).max(lenses);
     let richer = richer(layout, scores, known.is_some());
     let witnesses = witnesses(&solved.problem, layout, richer, factor * print_excess);
@@ -66,7 +85,7 @@ pub fn state(
     for witness in likeliest.into_iter().chain(witnesses.iter().filter(|w| w.layout.left == layout.left)) {
         covariance += &witness.step * witness.step.transpose();
     }
-    (covariance, pair_scatter, witnesses)
+    Stated { covariance, pair_scatter, witnesses, weighed }
 }
 
 /// Variance of what the pairs leave over what their corners' noise lets expect, as neighbouring corners and whole pairs

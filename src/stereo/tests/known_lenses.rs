@@ -6,6 +6,7 @@ use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
+use crate::stereo::select::stated_uncertainty::step;
 use crate::stereo::{Error, Side};
 
 /// Another day's pictures of the same rig.
@@ -126,4 +127,72 @@ fn three_pairs_that_scatter_do_not_pull_the_lenses_from_what_is_known_of_them() 
     assert!(of_baseline < 3.0, "{of_baseline}");
     let [[clean, of_baseline], _] = by_hand(0.0);
     assert!(clean < 1.0 && of_baseline < 3.0, "{clean} {of_baseline}");
+}
+
+/// What an earlier calibration whose right camera turned by so much from pair to pair knows, with how pairs move.
+fn known_by_hand(seed: u64, turn_deg: f64) -> KnownLenses {
+    let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
+    let mut known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
+    known.pair_excess = pair_excess(&earlier);
+    (known.pairs, known.noise) = (Some(earlier.pair_scatter.groups), Some(earlier.own_noise));
+    known.pair_motion = earlier.pair_motion().map(|[variances, _]| variances);
+    known
+}
+
+fn without_motion(known: &KnownLenses) -> KnownLenses {
+    let mut known = known.clone();
+    known.pair_motion = None;
+    known
+}
+
+/// How far the six numbers of `right_from_left` are off, squared, in units of a covariance of the shared numbers.
+fn off(found: &Calibration, world: &World, stated: &DMatrix<f64>) -> f64 {
+    let at = found.layout.transform_start();
+    let mut shared = found.values.shared.clone();
+    shared.rig.right_from_left = world.rig.right_from_left;
+    let step = step(&found.layout, &found.values.shared, &shared).rows(at, 6).into_owned();
+    let stated = stated.view((at, at), (6, 6)).into_owned();
+    step.dot(&stated.cholesky().unwrap().solve(&step)) / 6.0
+}
+
+#[test]
+fn three_pairs_are_weighed_by_how_pairs_are_known_to_move() {
+    const WORLDS: u64 = 8;
+    // Mean squares of how far the rig is off: not weighed and weighed in one unit, and weighed in its own.
+    let mean = |turn_deg: f64| {
+        let mut sums = [0.0; 3];
+        for seed in 400..400 + WORLDS {
+            let known = known_by_hand(seed, turn_deg);
+            let world = World::new(3, seed + 500);
+            let corners = world.corners_by_hand(seed + 500, turn_deg);
+            let weighed = calibrate(&corners, &knowing(known.clone())).unwrap();
+            let alone = calibrate(&corners, &knowing(without_motion(&known))).unwrap();
+            let each = [
+                off(&alone, &world, &alone.covariance),
+                off(&weighed, &world, &alone.covariance),
+                off(&weighed, &world, &weighed.covariance),
+            ];
+            sums.iter_mut().zip(each).for_each(|(sum, off)| *sum += off / WORLDS as f64);
+        }
+        sums
+    };
+    let [alone, weighed, own] = mean(0.03);
+    assert!(weighed < 0.75 * alone && own < 1.5, "{weighed} and not weighed {alone}; {own} of what is stated");
+    let [alone, weighed, own] = mean(0.0);
+    assert!((weighed / alone - 1.0).abs() < 0.1 && own < 1.5, "{weighed} {alone} {own}");
+}
+
+#[test]
+fn pairs_that_move_otherwise_than_is_known_are_not_weighed_by_it() {
+    let (known, world) = (known_by_hand(420, 0.002), World::new(3, 920));
+    let of = |turn_deg: f64, known: &KnownLenses| {
+        calibrate(&world.corners_by_hand(920, turn_deg), &knowing(known.clone())).unwrap()
+    };
+    let unknown = without_motion(&known);
+    assert_eq!(of(0.1, &known).values, of(0.1, &unknown).values);
+    assert_ne!(of(0.002, &known).values, of(0.002, &unknown).values);
+    // Nor by fewer pairs than there are.
+    let mut fewer = known.clone();
+    fewer.pairs = Some(3);
+    assert_eq!(of(0.002, &fewer).values, of(0.002, &unknown).values);
 }

@@ -79,6 +79,7 @@ fn known(seed: u64, pairs: usize, noise: Noise) -> Option<KnownLenses> {
     let mut known = KnownLenses::of_rig(found.rig(), &Side::BOTH);
     known.pairs = Some(found.pair_scatter.groups);
     known.noise = Some(found.own_noise);
+    known.pair_motion = found.pair_motion().map(|[variances, _]| variances);
     Some(known)
 }
 

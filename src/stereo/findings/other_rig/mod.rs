@@ -20,7 +20,6 @@ use crate::stereo::calibrate::Calibration;
 use crate::stereo::init::board_pose::as_two_boards;
 use crate::stereo::model::{Layout, Shared, Values};
 use crate::stereo::pairs::numbering::seen_on_rig;
-use crate::stereo::select::pair_motion;
 use crate::stereo::solve::uncertainty::invert;
 use crate::stereo::solve::{Priors, Problem};
 
@@ -34,8 +33,7 @@ pub fn is_one(found: &Calibration, lenses: &Rig, pairs: &[&PairCorners]) -> bool
 
 /// Logarithm of the likelihood of one place of the right camera in all pairs over that of one in each.
 fn evidence(found: &Calibration, lenses: &Rig, pairs: &[&PairCorners]) -> Option<f64> {
-    let equations = found.problem().equations(&found.layout)?;
-    let [scatter, noise] = pair_motion::of_pairs(&equations, &found.layout, found.inflation)?;
+    let [scatter, noise] = found.pair_motion()?;
     let unit = (scatter + noise).map(f64::sqrt);
     let size = pairs.len() * 6;
     let (mut places, mut known) = (DVector::<f64>::zeros(size), DMatrix::<f64>::zeros(size, size));
