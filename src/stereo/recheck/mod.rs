@@ -82,13 +82,15 @@ pub struct Recheck {
 
 pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     before.rig.check_size(corners)?;
-    let (problem, mut skipped) = start(before, corners);
+    let (mut problem, mut skipped) = start(before, corners);
+    let exchanged = exchanged(&problem, &corners.board);
+    if exchanged.len() >= FEWEST_PAIRS && exchanged.iter().all(|is| *is) {
+        return Err(Error::Exchanged);
+    }
+    leave_out(&mut problem, &exchanged, &mut skipped);
     if problem.views.len() < FEWEST_PAIRS {
         let total = corners.pairs.len() + corners.skipped.len();
         return Err(Error::TooFewPairs { found: problem.views.len(), needed: FEWEST_PAIRS, total, skipped });
-    }
-    if are_exchanged(&problem, &corners.board) {
-        return Err(Error::Exchanged);
     }
     skipped.sort_by(|a, b| a.pair.cmp(&b.pair));
     let layout =
@@ -163,15 +165,28 @@ fn strays(
 
 /// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to
 /// the other side.
-fn are_exchanged(problem: &Problem, board: &Board) -> bool {
+fn exchanged(problem: &Problem, board: &Board) -> Vec<bool> {
     const SEVERAL: f64 = 4.0;
     let shared = &problem.values.shared;
-    problem.views.iter().all(|view| {
+    let is_exchanged = |view: &View| {
         let mut other = view.exchanged();
         other.turn_right(board, numbering::on_rig(shared, board, &other).unwrap_or(0));
         let miss_px = |view: &View| misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px);
         SEVERAL * miss_px(&other) < miss_px(view)
-    })
+    };
+    problem.views.iter().map(is_exchanged).collect()
+}
+
+/// Leaves pairs out of which the pictures are exchanged.
+fn leave_out(problem: &mut Problem, exchanged: &[bool], skipped: &mut Vec<Skipped>) {
+    let reason = || "left and right picture are exchanged: give each the other's name".to_owned();
+    let Problem { views, values, .. } = problem;
+    let names = views.iter().zip(exchanged).filter(|(_, is)| **is).map(|(view, _)| view.pair.clone());
+    skipped.extend(names.map(|pair| Skipped { pair, reason: reason() }));
+    let mut is_left_out = exchanged.iter();
+    views.retain(|_| is_left_out.next() == Some(&false));
+    let mut is_left_out = exchanged.iter();
+    values.poses.retain(|_| is_left_out.next() == Some(&false));
 }
 
 /// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the

@@ -205,6 +205,25 @@ fn pictures_that_are_cut_otherwise_are_no_camera_that_turned() {
     assert!(found.cause().contains("yaw"), "{}", found.statement());
 }
 
+/// A pair whose two files were given each other's name.
+#[test]
+fn a_pair_with_its_pictures_exchanged_is_left_out_and_named() {
+    let before = calibrated(43);
+    let mut corners = after(43, |_| {});
+    assert!(recheck(&before, &corners).unwrap().skipped.is_empty());
+    let exchange = |corners: &mut Corners, at: usize| {
+        let pair = &mut corners.pairs[at];
+        std::mem::swap(&mut pair.left, &mut pair.right);
+    };
+    exchange(&mut corners, 1);
+    let found = recheck(&before, &corners).unwrap();
+    let [skipped] = &found.skipped[..] else { panic!("{:?}", found.skipped) };
+    assert!(skipped.pair == corners.pairs[1].pair && skipped.reason.contains("exchanged"), "{skipped:?}");
+    assert!(found.change.is_none() && found.pairs.len() == 2);
+    [0, 2].into_iter().for_each(|at| exchange(&mut corners, at));
+    assert!(matches!(recheck(&before, &corners), Err(Error::Exchanged)));
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused() {
     let mut before = calibrated(42);
