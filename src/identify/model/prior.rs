@@ -31,6 +31,9 @@ const TARGET_TURN_MRAD: f64 = 3000.0;
 
 const KINDS: usize = 8;
 
+/// Index of the kind of lengths.
+const LENGTHS: usize = 0;
+
 /// Index of the kind of zeros, and standard deviations that the search starts from, mm.
 const ZERO: usize = 6;
 const ZERO_STARTS: [f64; 4] = [0.03, 0.3, 1.0, 3.0];
@@ -180,7 +183,7 @@ impl Tolerance {
         gradient: &DVector<f64>,
     ) -> (Tolerance, f64) {
         let score = |t: &Tolerance| evidence_of_all(&t.standard_deviations(parameters, extras), normal, gradient);
-        best_of_grid(parameters, extras, &score)
+        best_of_grid(parameters, extras, &LARGEST, &score)
     }
 
     /// One a parameter, then one an extra.
@@ -213,7 +216,14 @@ impl Likelihood<'_> {
 
     /// The tolerance of greatest evidence.
     pub fn most_probable(&self) -> Tolerance {
-        best_of_grid(&self.seen(), self.extras, &|t| self.evidence(t)).0
+        best_of_grid(&self.seen(), self.extras, &LARGEST, &|t| self.evidence(t)).0
+    }
+
+    /// Logarithm of how much more probable the data are with this tolerance than with any that has lengths off by at
+    /// most so much, mm.
+    pub fn odds_of_lengths_beyond(&self, most_mm: f64, tolerance: &Tolerance) -> f64 {
+        let largest = std::array::from_fn(|k| if k == LENGTHS { most_mm } else { LARGEST[k] });
+        self.evidence(tolerance) - best_of_grid(&self.seen(), self.extras, &largest, &|t| self.evidence(t)).1
     }
 
     /// The largest standard deviations, kind by kind, that the data make next to as probable as these: few poses say
@@ -240,14 +250,20 @@ fn presence(parameters: &[Parameter], extras: &[Extra]) -> [bool; KINDS] {
     present
 }
 
-fn best_of_grid(parameters: &[Parameter], extras: &[Extra], score: &dyn Fn(&Tolerance) -> f64) -> (Tolerance, f64) {
+/// The tolerance of greatest score of which no kind is larger than these.
+fn best_of_grid(
+    parameters: &[Parameter],
+    extras: &[Extra],
+    largest: &[f64; KINDS],
+    score: &dyn Fn(&Tolerance) -> f64,
+) -> (Tolerance, f64) {
     let present = presence(parameters, extras);
     let start = Tolerance { lengths_mm: 1.0, angles_mrad: 1.0, target_mm: 10.0, ..Tolerance::START };
     let from = |start: Tolerance| {
         let mut best = (start, score(&start));
         for _ in 0..ROUNDS {
             for kind in (0..KINDS).filter(|&k| present[k]) {
-                for &value in GRID.iter().filter(|v| **v <= LARGEST[kind]) {
+                for &value in GRID.iter().filter(|v| **v <= largest[kind]) {
                     let trial = best.0.with(kind, value);
                     let score = score(&trial);
                     if score > best.1 {
@@ -327,6 +343,24 @@ mod tests {
         let data =
             Likelihood { base: &base, parameters: &parameters, extras: &[], normal: &normal, gradient: &gradient };
         assert_eq!(data.most_probable().lengths_mm, 3.0);
+    }
+
+    #[test]
+    fn lengths_that_are_off_by_more_than_a_limit_are_told_from_angles() {
+        // Ten lengths, each seen with an angle that acts alike but for its size.
+        let parameters: Vec<Parameter> = (0..10).flat_map(|i| [Parameter::A(i), Parameter::Theta(i)]).collect();
+        let jacobian = DMatrix::<f64>::identity(20, 20);
+        let base = Base::new(&jacobian, 1e-9);
+        let odds = |mm: f64| {
+            let sign = |i: usize| if i % 4 < 2 { 1.0 } else { -1.0 };
+            let residuals = DVector::from_fn(20, |i, _| sign(i) * if i % 2 == 0 { mm } else { 1.0 });
+            let (normal, gradient) = (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residuals));
+            let data =
+                Likelihood { base: &base, parameters: &parameters, extras: &[], normal: &normal, gradient: &gradient };
+            data.odds_of_lengths_beyond(3.0, &data.most_probable())
+        };
+        assert_eq!(odds(2.0), 0.0);
+        assert!(odds(30.0) > 10.0, "{}", odds(30.0));
     }
 
     #[test]

@@ -80,7 +80,10 @@ impl Findings {
         let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
         let notes = noise.into_iter().chain(of_fit).filter(|finding| !is_told(finding)).collect();
         // A scale makes every length another.
-        let beyond = plausible::of_links(found).filter(|_| against.is_empty() && scale.is_none());
+        let beyond = plausible::of_links(found)
+            .filter(|_| scale.is_none())
+            .or_else(|| plausible::of_all_lengths(found))
+            .filter(|_| against.is_empty());
         let terms = plausible::of_terms(found);
         let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined

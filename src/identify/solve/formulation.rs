@@ -185,6 +185,18 @@ impl Formulation {
         Fit::free(&self.rows, &self.base, self.spread(), none).normal(&self.free_fit.x)
     }
 
+    /// Logarithm of how much more probable the rows are with links that are off by what was found than with links that
+    /// are off by at most so much, mm; zero where nothing was found of how they are made.
+    pub fn odds_of_lengths_beyond(&self, most_mm: f64) -> f64 {
+        if !self.held || self.tolerance.lengths_mm <= most_mm {
+            return 0.0;
+        }
+        let (normal, gradient) = self.normal();
+        let (base, parameters, extras) = (&self.base, self.parameters(), self.rows.extras.as_slice());
+        let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
+        data.odds_of_lengths_beyond(most_mm, &self.tolerance)
+    }
+
     /// Covariance of all parameters of the robot as far as the poses determine them.
     pub fn robot_covariance(&self) -> DMatrix<f64> {
         let rank = self.base.rank();
