@@ -195,7 +195,6 @@ fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool)
         solved_by(&start, choose).map_err(|e| e.without(&skipped).of_one_pose(one_pose()).of_lens(options.lens))?;
     let Choice { layout, scatter, scores: lens_scores, .. } = choice;
     let known = options.known.as_ref();
-    let each_alone = known.is_none() && scatter.is_some();
     let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
     let neighbours = solved.problem.neighbours();
     let inflation = solved.inflation();
@@ -229,7 +228,7 @@ fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool)
         witnesses,
         inflation,
         priors,
-        each_alone,
+        each_alone: known.is_none() && scatter.is_some(),
         runs,
         alone_px,
         skipped,
