@@ -53,7 +53,7 @@ fn judgement(calibration: &Calibration, judged: &Judged) -> [(&'static str, Valu
         ("expanded_uncertainty_mm", json!(worst.expanded_uncertainty_mm())),
         // Standard deviations through the corners, the calibration, and the board's certificate; null without one.
         ("uncertainty_shares_mm", json!([Some(worst.corners_mm), Some(worst.calibration_mm), board_mm])),
-        ("reprojection_rms_px", json!(calibration.rms_px)),
+        ("reprojection_rms_px", json!(calibration.rms_px())),
     ]
 }
 

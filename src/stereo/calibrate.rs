@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
 use crate::stereo::board_pose::print_share::print_share;
-use crate::stereo::data::{NeighbourCorrelation, Noise, View};
+use crate::stereo::data::{NeighbourCorrelation, Noise, View, residuals};
 use crate::stereo::init::board_pose;
 use crate::stereo::model::{Covariance, Layout, Values};
 use crate::stereo::pairs::candidates::Candidates;
@@ -61,8 +61,6 @@ pub struct Calibration {
     pub pair_scatter: PairScatter,
     /// Richer models whose additional terms are more than chance.
     pub witnesses: Vec<Witness>,
-    /// Root mean square of the length of the 2-D residuals of both pictures, px.
-    pub rms_px: f64,
     /// Pairs that were not used.
     pub skipped: Vec<Skipped>,
     /// The same with causes, and the corners that were rejected.
@@ -91,6 +89,12 @@ impl Calibration {
     pub fn spread_mm(&self) -> Option<[f64; 2]> {
         let spread = self.spread.as_ref()?;
         Some([self.board.spread_mm() + spread.change_mm, 2.0 * spread.sigma_mm * self.inflation.sqrt()])
+    }
+
+    /// Root mean square of the length of the 2-D residuals of both pictures, px.
+    pub fn rms_px(&self) -> f64 {
+        let left = residuals::active(&self.views, &self.values).unwrap_or_default();
+        residuals::root_mean_square(left.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0)
     }
 
     /// Names of the pairs that were used.
@@ -220,7 +224,6 @@ fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool)
         board: corners.board,
         spread,
         layout,
-        rms_px: solved.rms_px,
         noise: solved.noise,
         own_noise,
         neighbours,

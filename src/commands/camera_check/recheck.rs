@@ -182,9 +182,9 @@ fn corners(
     config: &Config,
     (out, calibration): (&OutDir, &Utf8Path),
 ) -> Result<(Corners, Own)> {
-    let named = args.board.is_some() || args.squares.is_some() || args.square_mm.is_some();
+    let named = args.board.is_some() || args.squares.is_some();
     let board = |pairing: Option<&Pairing>| match calibrated.board.filter(|_| !named) {
-        Some(board) => Ok(board),
+        Some(board) => Ok(args.square_mm.map_or(board, |mm| board.scaled(mm / board.square_mm))),
         None => squares(args, pairing)
             .and_then(|squares| Ok(config.check_board.board(args.board, squares, args.square_mm)?)),
     };

@@ -99,20 +99,21 @@ impl CommonScale {
     pub fn sentence(&self) -> String {
         let CommonScale { share, sigma, unseen, of, .. } = *self;
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
-        let odds = (self.log_odds < TOLD_APART).then(|| format!(" (odds of {:.0} to 1)", self.log_odds.exp()));
-        let are = if odds.is_some() { "may be" } else { "are" };
-        match self.is_significant() {
-            true => format!(
-                "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} {are} scaled, along all axes or one, or the lengths of the robot \
-                 file{}",
-                100.0 * sigma,
-                odds.unwrap_or_default()
-            ),
-            false => format!(
+        if !self.is_significant() {
+            return format!(
                 "a scale error of the {of} of up to {:.2} % cannot be told from a robot of another size",
                 100.0 * unseen
-            ),
+            );
         }
+        let (are, odds) = match self.log_odds < TOLD_APART {
+            true => ("may be", format!(" (odds of {:.0} to 1)", self.log_odds.exp())),
+            false => ("are", String::new()),
+        };
+        format!(
+            "all links are found {percent:.2} % (+- {:.2}) {way} than the nominal ones: the {of} {are} scaled, along all axes or one, or the lengths of the robot \
+             file{odds}",
+            100.0 * sigma
+        )
     }
 }
 

@@ -104,10 +104,7 @@ impl Formulation {
             common: 1.0,
         };
         if held {
-            let (normal, gradient) = formulation.normal();
-            let (base, Task { parameters, extras, .. }) = (&formulation.base, *task);
-            let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
-            formulation.most = data.at_most(&tolerance);
+            formulation.most = formulation.with_likelihood(|data| data.at_most(&tolerance));
         }
         Ok(formulation)
     }
@@ -191,10 +188,14 @@ impl Formulation {
         if !self.held || self.tolerance.lengths_mm <= most_mm {
             return 0.0;
         }
+        self.with_likelihood(|data| data.odds_of_lengths_beyond(most_mm, &self.tolerance))
+    }
+
+    /// What the rows say of tolerances.
+    fn with_likelihood<T>(&self, ask: impl FnOnce(&Likelihood) -> T) -> T {
         let (normal, gradient) = self.normal();
         let (base, parameters, extras) = (&self.base, self.parameters(), self.rows.extras.as_slice());
-        let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
-        data.odds_of_lengths_beyond(most_mm, &self.tolerance)
+        ask(&Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient })
     }
 
     /// Covariance of all parameters of the robot as far as the poses determine them.

@@ -90,7 +90,7 @@ pub(super) fn residuals(calibration: &Calibration, judged: &Judged) -> Result<Ma
             (format!(
                 "Root mean square {:.4} px (length of the 2-D residual, both pictures), corner scatter {:.4} px a coordinate. {chi} \
                  Neighbouring corners' residuals correlate by {:.3} (chance: {:.3}).",
-                calibration.rms_px,
+                calibration.rms_px(),
                 noise.typical_px(&calibration.views),
                 judged.facts.residual_pattern.neighbours.along,
                 judged.facts.residual_pattern.neighbours.standard_error))

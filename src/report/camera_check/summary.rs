@@ -179,7 +179,7 @@ fn rig(calibration: &Calibration, judged: &Judged) -> String {
         "{} lens, baseline {} mm, reprojection RMS {} px, epipolar error RMS {} px",
         rig.left.lens.name(),
         number(Some(rig.baseline_mm()), 3),
-        number(Some(calibration.rms_px), 3),
+        number(Some(calibration.rms_px()), 3),
         number(Some(epipolar.rms_px), 3),
     )
 }

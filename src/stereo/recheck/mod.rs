@@ -82,12 +82,10 @@ pub struct Recheck {
 
 pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     before.rig.check_size(corners)?;
-    let (mut problem, mut skipped) = start(before, corners);
-    let exchanged = exchanged(&problem, &corners.board);
-    if exchanged.len() >= FEWEST_PAIRS && exchanged.iter().all(|is| *is) {
+    let (problem, mut skipped, exchanged) = start(before, corners);
+    if problem.views.is_empty() && exchanged >= FEWEST_PAIRS {
         return Err(Error::Exchanged);
     }
-    leave_out(&mut problem, &exchanged, &mut skipped);
     if problem.views.len() < FEWEST_PAIRS {
         let total = corners.pairs.len() + corners.skipped.len();
         return Err(Error::TooFewPairs { found: problem.views.len(), needed: FEWEST_PAIRS, total, skipped });
@@ -163,30 +161,14 @@ fn strays(
     strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 
-/// Whether each pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to
-/// the other side.
-fn exchanged(problem: &Problem, board: &Board) -> Vec<bool> {
+/// Whether a pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the
+/// other side.
+fn is_exchanged(shared: &Shared, board: &Board, view: &View) -> bool {
     const SEVERAL: f64 = 4.0;
-    let shared = &problem.values.shared;
-    let is_exchanged = |view: &View| {
-        let mut other = view.exchanged();
-        other.turn_right(board, numbering::on_rig(shared, board, &other).unwrap_or(0));
-        let miss_px = |view: &View| misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px);
-        SEVERAL * miss_px(&other) < miss_px(view)
-    };
-    problem.views.iter().map(is_exchanged).collect()
-}
-
-/// Leaves pairs out of which the pictures are exchanged.
-fn leave_out(problem: &mut Problem, exchanged: &[bool], skipped: &mut Vec<Skipped>) {
-    let reason = || "left and right picture are exchanged: give each the other's name".to_owned();
-    let Problem { views, values, .. } = problem;
-    let names = views.iter().zip(exchanged).filter(|(_, is)| **is).map(|(view, _)| view.pair.clone());
-    skipped.extend(names.map(|pair| Skipped { pair, reason: reason() }));
-    let mut is_left_out = exchanged.iter();
-    views.retain(|_| is_left_out.next() == Some(&false));
-    let mut is_left_out = exchanged.iter();
-    values.poses.retain(|_| is_left_out.next() == Some(&false));
+    let mut other = view.exchanged();
+    other.turn_right(board, numbering::on_rig(shared, board, &other).unwrap_or(0));
+    let miss_px = |view: &View| misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px);
+    SEVERAL * miss_px(&other) < miss_px(view)
 }
 
 /// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the
@@ -202,27 +184,30 @@ fn step_from_old(solved: &Solved, old: &Values, layout: &Layout) -> Option<(DVec
     Some((-normal_equations::solve_scaled(&matrix, &gradient)?, uncertainty::invert(&matrix)?))
 }
 
-/// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for.
-fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>) {
+/// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for; those that are
+/// left out, and of how many of these the pictures are exchanged.
+fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, usize) {
     let shared = Shared { rig: before.rig.clone(), shape_mm: FLAT };
     let mut skipped = corners.skipped.clone();
-    let (mut views, mut poses) = (Vec::new(), Vec::new());
+    let (mut views, mut poses, mut exchanged) = (Vec::new(), Vec::new(), 0);
     for pair in &corners.pairs {
         let view = numbering::seen_on_rig(&shared, &corners.board, pair, before.noise.as_ref());
+        let mut skip = |reason: &str| skipped.push(Skipped { pair: pair.pair.clone(), reason: reason.to_owned() });
         match misfit_px(&shared, &view) {
+            Some(_) if is_exchanged(&shared, &corners.board, &view) => {
+                exchanged += 1;
+                skip("left and right picture are exchanged: give each the other's name");
+            }
             Some((_, pose)) => {
                 views.push(view);
                 poses.push(pose);
             }
-            None => {
-                let reason = "its corners give no pose of the board on this rig".to_owned();
-                skipped.push(Skipped { pair: pair.pair.clone(), reason });
-            }
+            None => skip("its corners give no pose of the board on this rig"),
         }
     }
     let known = KnownLenses::of_cameras([Some(before.rig.left), Some(before.rig.right)]).loosened();
     let priors = Priors::of_rig(&before.rig, corners.board.diagonal_mm()).knowing(&known);
-    (Problem { views, values: Values { shared, poses }, priors }, skipped)
+    (Problem { views, values: Values { shared, poses }, priors }, skipped, exchanged)
 }
 
 impl Before {

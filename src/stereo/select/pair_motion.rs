@@ -121,8 +121,6 @@ pub fn weighed(
 ) -> Option<(Values, DMatrix<f64>)> {
     let at = layout.transform.then(|| layout.transform_start())?;
     let mut problem = problem.clone();
-    let (pairs, prior) = in_units_of_noise(&problem.equations(layout)?, inflation)?;
-    let excess = excess(&pairs, &prior, at, &known.variances, lenses, stated)?;
     let mut covariance = None;
     for _ in 0..STEPS {
         let (pairs, prior) = in_units_of_noise(&problem.equations(layout)?, inflation)?;
@@ -133,6 +131,7 @@ pub fn weighed(
             return None;
         }
         board_pose::move_shared(&mut problem.values, &problem.views, layout, &step);
+        let excess = excess(&pairs, &prior, at, &known.variances, lenses, stated)?;
         covariance = Some(&shared * (by_pairs.matrix * excess + prior.matrix * lenses) * &shared);
     }
     Some((problem.values, covariance?))

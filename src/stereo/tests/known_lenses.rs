@@ -95,23 +95,38 @@ fn of_two_calibrations_each_gives_its_side() {
     assert_eq!(both.covariance()[(0, left)], 0.0);
 }
 
+/// What an earlier calibration whose right camera turned by so much from pair to pair knows, with how pairs move.
+fn known_by_hand(seed: u64, turn_deg: f64) -> KnownLenses {
+    let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
+    let mut known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
+    known.pair_excess = pair_excess(&earlier);
+    (known.pairs, known.noise) = (Some(earlier.pair_scatter.groups), Some(earlier.own_noise));
+    known.pair_motion = earlier.pair_motion().map(|[variances, _]| variances);
+    known
+}
+
+fn without_motion(known: &KnownLenses) -> KnownLenses {
+    let mut known = known.clone();
+    known.pair_motion = None;
+    known
+}
+
 /// Deviations of three pairs' focal lengths from the known ones in their standard deviations, mean square; and of the
 /// baseline from the truth in its own. With the scatter of the earlier pairs told, and without.
 fn by_hand(turn_deg: f64) -> [[f64; 2]; 2] {
     const WORLDS: u64 = 4;
     let mut squares = [[0.0; 2]; 2];
     for seed in 300..300 + WORLDS {
-        let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
-        let alone = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
-        let mut told = alone.clone();
-        told.pair_excess = pair_excess(&earlier);
-        (told.pairs, told.noise) = (Some(earlier.pair_scatter.groups), Some(earlier.own_noise));
+        let told = known_by_hand(seed, turn_deg);
+        let mut alone = without_motion(&told);
+        (alone.pair_excess, alone.pairs, alone.noise) = (1.0, None, None);
+        let focal_px = told.camera(Side::Left).unwrap().fx;
         let world = World::new(3, seed + 500);
         let corners = world.corners_by_hand(seed + 500, turn_deg);
         for (known, squares) in [told, alone].into_iter().zip(&mut squares) {
             let sigma = known.covariance()[(0, 0)].sqrt();
             let found = calibrate(&corners, &knowing(known)).unwrap();
-            squares[0] += ((found.rig().left.fx - earlier.rig().left.fx) / sigma).powi(2) / WORLDS as f64;
+            squares[0] += ((found.rig().left.fx - focal_px) / sigma).powi(2) / WORLDS as f64;
             let off = found.rig().right_from_left.translation.x - world.rig.right_from_left.translation.x;
             squares[1] += off * off / covariance_of(&found, &["right_from_left.tx_mm"])[(0, 0)] / WORLDS as f64;
         }
@@ -127,22 +142,6 @@ fn three_pairs_that_scatter_do_not_pull_the_lenses_from_what_is_known_of_them() 
     assert!(of_baseline < 3.0, "{of_baseline}");
     let [[clean, of_baseline], _] = by_hand(0.0);
     assert!(clean < 1.0 && of_baseline < 3.0, "{clean} {of_baseline}");
-}
-
-/// What an earlier calibration whose right camera turned by so much from pair to pair knows, with how pairs move.
-fn known_by_hand(seed: u64, turn_deg: f64) -> KnownLenses {
-    let earlier = calibrate(&World::new(12, seed).corners_by_hand(seed, turn_deg), &BROWN4).unwrap();
-    let mut known = KnownLenses::of_rig(earlier.rig(), &Side::BOTH);
-    known.pair_excess = pair_excess(&earlier);
-    (known.pairs, known.noise) = (Some(earlier.pair_scatter.groups), Some(earlier.own_noise));
-    known.pair_motion = earlier.pair_motion().map(|[variances, _]| variances);
-    known
-}
-
-fn without_motion(known: &KnownLenses) -> KnownLenses {
-    let mut known = known.clone();
-    known.pair_motion = None;
-    known
 }
 
 /// How far the six numbers of `right_from_left` are off, squared, in units of a covariance of the shared numbers.

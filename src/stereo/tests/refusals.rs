@@ -62,7 +62,7 @@ fn pairs_of_nothing_in_common_are_refused_by_name() {
             let is_told = |pair: &Skipped| ["exchanged", "turned", "mirrored"].iter().any(|w| pair.reason.contains(w));
             assert!(!bad.iter().any(is_told), "{bad:?}");
         }
-        other => panic!("{:?}", other.map(|c| c.rms_px)),
+        other => panic!("{:?}", other.map(|c| c.rms_px())),
     }
 }
 
@@ -84,7 +84,7 @@ fn a_series_that_is_shifted_against_the_other_side_is_named() {
                     "{by}: {left} {right}"
                 );
             }
-            other => panic!("{by}: {:?}", other.map(|(c, _)| c.rms_px)),
+            other => panic!("{by}: {:?}", other.map(|(c, _)| c.rms_px())),
         }
     }
 }
@@ -101,7 +101,7 @@ fn a_shifted_series_with_gaps_is_named_all_the_same() {
         Err(Error::Shifted { fit, of, left, right, .. }) => {
             assert!(fit >= 4 && of <= 8 && left != right, "{fit} {of} {left} {right}")
         }
-        other => panic!("{:?}", other.map(|(c, _)| c.rms_px)),
+        other => panic!("{:?}", other.map(|(c, _)| c.rms_px())),
     }
 }
 
@@ -118,7 +118,7 @@ fn a_side_whose_pictures_are_all_mirrored_or_inverted_is_named() {
             pair.right.iter_mut().for_each(change);
             pair.right.sort_by_key(|corner| (corner.row, corner.col));
         }
-        calibrate_standing(&corners, &asked()).map(|(found, _)| found.rms_px)
+        calibrate_standing(&corners, &asked()).map(|(found, _)| found.rms_px())
     };
     let mirrored = changed(&|corner| {
         corner.px.x = width - 1.0 - corner.px.x;
