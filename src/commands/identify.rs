@@ -72,7 +72,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
         json
     } else {
         let identified = &found.candidates[found.chosen].robot;
-        report::identify::summary(&record, (file.as_deref(), &nominal, identified), placed.is_some(), &out)
+        report::identify::summary(&record, (file.as_deref(), identified), placed.is_some(), &out)
     };
     let status = record.check().status();
     Ok(Outcome { stdout, status })

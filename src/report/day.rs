@@ -95,9 +95,19 @@ fn chosen(robot: &Value) -> Option<&Value> {
     methods.iter().find(|m| format!("{}/{}", text(m, "/name"), text(m, "/model")) == wanted)
 }
 
-/// Its mean distance error on verify rows, mm.
+/// The mean error on verify rows that the page of `identify` shows first, and where its numbers have it: of points where
+/// there are any, else of distances.
+fn mean_error(robot: &Value) -> (&'static str, &'static str) {
+    const OF_POINTS: &str = "/verify/point/mean_abs_mm";
+    match chosen(robot).and_then(|method| method.pointer(OF_POINTS)).is_some_and(Value::is_number) {
+        true => ("mean position error", OF_POINTS),
+        false => ("mean distance error", "/verify/mean_abs_mm"),
+    }
+}
+
+/// This error of the robot that was kept, mm.
 fn after(robot: &Value) -> String {
-    chosen(robot).map_or_else(|| "n/a".to_owned(), |method| mm(method, "/verify/mean_abs_mm"))
+    chosen(robot).map_or_else(|| "n/a".to_owned(), |method| mm(method, mean_error(robot).1))
 }
 
 /// The lines on stdout.
@@ -160,23 +170,25 @@ fn robot_words(robot: &Value) -> String {
     }
     let doubts = || format!("; check before you use the identified robot: {}", text(robot, "/reason"));
     let doubt = if text(robot, "/advice") == "check" { doubts() } else { String::new() };
-    let before = mm(robot, "/before/verify/mean_abs_mm");
-    format!("mean distance error {before} mm before, {} mm after{doubt}", after(robot))
+    let (what, at) = mean_error(robot);
+    let before = mm(robot, &format!("/before{at}"));
+    format!("{what} {before} mm before, {} mm after{doubt}", after(robot))
 }
 
 /// The number that matters most of each part that is there.
-fn numbers(day: &Day) -> Vec<(String, &'static str)> {
+fn numbers(day: &Day) -> Vec<(String, String)> {
     let length = |check: &Value| format!("{} mm", bound(check, "/judged_length/at_most_mm"));
     let poses = |measured: &Value| format!("{} of {}", count(measured, "/measured"), count(measured, "/poses"));
     let parts = [
-        (day.check.as_ref().map(length), "largest length error of the rig with its uncertainty"),
-        (day.measured.as_ref().map(poses), "poses measured"),
-        (
-            day.robot.as_ref().map(|robot| format!("{} mm", after(robot))),
-            "mean distance error of the robot after identification",
-        ),
+        day.check
+            .as_ref()
+            .map(|check| (length(check), "largest length error of the rig with its uncertainty".to_owned())),
+        day.measured.as_ref().map(|measured| (poses(measured), "poses measured".to_owned())),
+        day.robot.as_ref().map(|robot| {
+            (format!("{} mm", after(robot)), format!("{} of the robot after identification", mean_error(robot).0))
+        }),
     ];
-    parts.into_iter().filter_map(|(value, what)| Some((value?, what))).collect()
+    parts.into_iter().flatten().collect()
 }
 
 pub fn page(day: &Day) -> String {

@@ -59,7 +59,9 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let corners = open_numbers::by_rig(corners, &known.rig);
     corners.notes.iter().for_each(progress::note);
     let mut series = series::measure(&known, seen(poses, &corners));
-    series.notes.extend(extras::shifted(&series)?);
+    let shifted = extras::shifted(&series)?;
+    let is_open = shifted.is_some() || series.judgement.leaves_open(known.tolerance_mm);
+    series.notes.extend(shifted);
     let file = MeasureFile::new(&series, &corners, &known);
     say(&series, &file);
     let distances = extras::distances(&series)?;
@@ -77,7 +79,7 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     report::page::write(&out, "measure.html", page)?;
     end(&series, &known, &out)?;
     let stdout = if args.output.json { json } else { report::measure::summary(&file, &out) };
-    let status = if series.judgement.leaves_open(known.tolerance_mm) { Status::OutOfTolerance } else { status };
+    let status = if is_open { Status::OutOfTolerance } else { status };
     Ok(Outcome { stdout, status })
 }
 

@@ -1,4 +1,5 @@
-//! What did not move: poses that the robot came back to, and joints that are the same in all rows.
+//! What did not move: poses that the robot came back to, joints that are the same in all rows, and how far each joint
+//! moves the target.
 
 use std::collections::BTreeSet;
 
@@ -6,6 +7,7 @@ use nalgebra::Point3;
 
 use super::dataset::Dataset;
 use crate::identify::Error;
+use crate::robot::Robot;
 
 /// Joints within this, rad or mm, are the same.
 const SAME_JOINT: f64 = 1e-9;
@@ -47,6 +49,29 @@ pub fn constant_joints(set: &Dataset) -> Vec<String> {
     let Some(first) = set.poses.first() else { return Vec::new() };
     let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
     (0..set.joint_count()).filter(constant).map(|joint| (joint + 1).to_string()).collect()
+}
+
+/// The joint's value in the middle of these rows.
+fn middle(set: &Dataset, rows: &[usize], joint: usize) -> f64 {
+    rows.iter().map(|&row| set.poses[row].joints_rad[joint]).sum::<f64>() / rows.len().max(1) as f64
+}
+
+/// How far the joint turns (or slides) at the most from its middle, rad or mm.
+pub fn turn(set: &Dataset, rows: &[usize], joint: usize) -> f64 {
+    let middle = middle(set, rows, joint);
+    rows.iter().map(|&row| (set.poses[row].joints_rad[joint] - middle).abs()).fold(0.0, f64::max)
+}
+
+/// How far the target is from where it would be if the joint stood still, mm a coordinate, root of the mean square.
+pub fn moves_mm(set: &Dataset, robot: &Robot, rows: &[usize], joint: usize) -> f64 {
+    let middle = middle(set, rows, joint);
+    let square = |&row: &usize| {
+        let joints = &set.poses[row].joints_rad;
+        let mut still = joints.clone();
+        still[joint] = middle;
+        (robot.target_mm(joints) - robot.target_mm(&still)).norm_squared()
+    };
+    (rows.iter().map(square).sum::<f64>() / (3 * rows.len()).max(1) as f64).sqrt()
 }
 
 #[cfg(test)]

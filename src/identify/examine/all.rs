@@ -34,13 +34,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let (mut unexplained_mm, mut mended) = (None, Vec::new());
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
-        let (of_rows, of_orientations, of_known);
+        let (of_rows, open, of_orientations, of_known);
         (set, of_rows) = shifted::examine(&set, &robot);
-        Mended { set, robot, findings, against, unexplained_mm } = conventions::examine(&set, &robot, settings);
+        Mended { set, robot, findings, against, open, unexplained_mm } = conventions::examine(&set, &robot, settings);
         findings.splice(0..0, of_rows);
         mended.clone_from(&findings);
         (set, of_orientations) = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
         (set, of_known) = known::examine(&set, &robot, settings);
+        findings.extend(open);
         findings.extend(of_orientations);
         findings.extend(of_known);
     }

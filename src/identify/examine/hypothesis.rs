@@ -28,6 +28,8 @@ pub enum Hypothesis {
     Negated(usize),
     /// A joint is off by so many degrees.
     Offset(usize, f64),
+    /// The twist of a joint's link has the wrong sign in the robot's file.
+    Twisted(usize),
     /// Joints, or one, stand so many rows off.
     Lagging(Option<usize>, isize),
     /// The robot's parameters are standard DH ones.
@@ -38,6 +40,9 @@ pub enum Hypothesis {
 
 /// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.
 const STILL: f64 = 0.02;
+
+/// Sine of a twist whose sign matters: a smaller one is an error of manufacture.
+const LEAST_TWIST: f64 = 0.1;
 
 /// How far a joint moves, rad or mm.
 fn way(set: &Dataset, joint: usize) -> f64 {
@@ -53,7 +58,7 @@ pub fn still(set: &Dataset) -> Vec<usize> {
 }
 
 /// All that may be wrong with a set of this kind.
-pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
+pub fn hypotheses(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
     let joints = set.joint_count();
     let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
     // A touch reads no length.
@@ -88,6 +93,7 @@ pub fn hypotheses(set: &Dataset) -> Vec<Hypothesis> {
         list.extend([1, -1].map(|by| Hypothesis::Lagging(Some(i), by)));
     }
     list.extend([1, -1].map(|by| Hypothesis::Lagging(None, by)));
+    list.extend((0..joints).filter(|&i| robot.joints[i].alpha_rad.sin().abs() > LEAST_TWIST).map(Hypothesis::Twisted));
     list
 }
 
@@ -104,6 +110,17 @@ impl Hypothesis {
             Hypothesis::Exchanged(i, j) => still.contains(&i) && still.contains(&j),
             Hypothesis::Negated(i) | Hypothesis::Offset(i, _) => still.contains(&i),
             _ => false,
+        }
+    }
+
+    /// The joint that it is about, where it is about what one reads.
+    pub fn of_one_joint(self) -> Option<usize> {
+        match self {
+            Hypothesis::JointRadians(i)
+            | Hypothesis::Negated(i)
+            | Hypothesis::Offset(i, _)
+            | Hypothesis::Lagging(Some(i), _) => Some(i),
+            _ => None,
         }
     }
 
@@ -141,6 +158,7 @@ impl Hypothesis {
                 format!("joint {} is counted the other way round: its sign is flipped (negated)", i + 1)
             }
             Hypothesis::Offset(i, deg) => format!("joint {} is offset by {deg:.0} deg", i + 1),
+            Hypothesis::Twisted(i) => format!("`alpha_deg` of joint {} has the wrong sign", i + 1),
             Hypothesis::Lagging(None, by) => format!("the joints lag {by} row against the readings"),
             Hypothesis::Lagging(Some(i), by) => format!("joint {} lags {by} row against the others", i + 1),
             Hypothesis::StandardDh => "the robot file holds standard DH parameters, not modified ones (MDH)".to_owned(),
@@ -150,8 +168,8 @@ impl Hypothesis {
 
     /// Whether readings of the joints, in other files too, mean something else than the robot file says.
     pub fn is_of_counting(self) -> bool {
-        use Hypothesis::{Coupled, Exchanged, Negated, Offset, StandardDh};
-        matches!(self, Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh)
+        use Hypothesis::{Coupled, Exchanged, Negated, Offset, StandardDh, Twisted};
+        matches!(self, Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh | Twisted(_))
     }
 
     /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot
@@ -168,6 +186,7 @@ impl Hypothesis {
                 "`theta_deg` of joint {} in the robot file, by {deg:+.0}, where the controller counts so, else the table",
                 i + 1
             ),
+            Hypothesis::Twisted(i) => format!("`alpha_deg` of joint {} in the robot file", i + 1),
             // A robot file has no word for it.
             Hypothesis::Coupled(i, times) => {
                 let ([joint, before], [there, back]) = ([i + 1, i], if times < 0.0 { ['+', '-'] } else { ['-', '+'] });
@@ -177,8 +196,8 @@ impl Hypothesis {
             }
             Hypothesis::StandardDh => "the robot file: `robot import TABLE --dh classic` reads such rows".to_owned(),
             Hypothesis::Mirrored => {
-                "the table, of which x is negated here and in what is placed: whether x, y or z is the wrong one the \
-                                     readings do not tell"
+                "the table, of which x is negated here and in what is placed: whether x, y or z has the wrong sign, or two \
+                 of them are exchanged, the readings do not tell"
                     .to_owned()
             }
             _ => "the table".to_owned(),
@@ -211,6 +230,7 @@ impl Hypothesis {
             Hypothesis::Exchanged(i, j) => set.poses.iter_mut().for_each(|p| p.joints_rad.swap(i, j)),
             Hypothesis::Negated(i) => robot.joints[i].sign = -robot.joints[i].sign,
             Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
+            Hypothesis::Twisted(i) => robot.joints[i].alpha_rad = -robot.joints[i].alpha_rad,
             Hypothesis::Lagging(joint, by) => set = lagging(set, joint, by),
             Hypothesis::StandardDh => robot = from_standard(&robot),
             Hypothesis::Mirrored => {

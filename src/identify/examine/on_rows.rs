@@ -79,7 +79,7 @@ pub fn of_known(set: &Dataset, robot: &Robot, p95_mm: f64, settings: &Settings) 
         let explains = STRIKING * there_mm < now_mm && (is_length || there_mm < WITHIN * p95_mm);
         explains.then_some((there_mm, *h, rows))
     };
-    let found: Vec<(f64, Hypothesis, Dataset)> = hypotheses(set).par_iter().filter_map(of).collect();
+    let found: Vec<(f64, Hypothesis, Dataset)> = hypotheses(set, robot).par_iter().filter_map(of).collect();
     let (there_mm, hypothesis, mended) = found.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let finding = Finding::new(
         format!("{} (the errors fall from {now_mm:.2} to {there_mm:.3} mm)", hypothesis.name()),

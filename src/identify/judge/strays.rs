@@ -17,6 +17,9 @@ use crate::statistics::median;
 /// another thing.
 const FAR: f64 = 12.0;
 
+/// A row that another robot has within this share of that is none.
+const NEAR: f64 = 0.5;
+
 /// One row in so many may be a stray.
 const SHARE: usize = 5;
 
@@ -95,19 +98,23 @@ pub fn find(judge: &Judge, (robots, sets): (&[&Robot], &[&Dataset]), judged: &[u
         let median_mm = median(sizes.iter().map(|(_, size)| *size))?;
         Some((median_mm, sizes, placing, robot, judge))
     });
-    let (median_mm, sizes, placing, robot, judge) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let all: Vec<_> = all.collect();
+    let (median_mm, sizes, placing, robot, judge) = all.iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let limit_mm = FAR * median_mm.max(REPEATABILITY_MM);
-    let far: Vec<(usize, f64)> = sizes.iter().copied().filter(|(_, size)| *size > limit_mm).collect();
+    // What another robot has near is no misread row, but where this robot is not right.
+    let is_near = |row: usize| all.iter().any(|of| of.1.iter().any(|&(r, size)| r == row && size < limit_mm * NEAR));
+    let far: Vec<(usize, f64)> =
+        sizes.iter().copied().filter(|&(row, size)| size > limit_mm && !is_near(row)).collect();
     if far.is_empty() || far.len() * SHARE > sizes.len() {
         return None;
     }
     let rows: Vec<usize> = far.iter().map(|(row, _)| *row).collect();
     let most_mm = far.iter().map(|(_, size)| *size).fold(0.0, f64::max);
     let exchanged = match rows[..] {
-        [a, b] => are_exchanged(&judge, robot, &placing, [a, b], limit_mm),
+        [a, b] => are_exchanged(judge, robot, placing, [a, b], limit_mm),
         _ => false,
     };
-    Some(Strays { rows, most_mm, median_mm, exchanged })
+    Some(Strays { rows, most_mm, median_mm: *median_mm, exchanged })
 }
 
 /// Whether two rows are near with each other's readings.
@@ -154,5 +161,20 @@ mod tests {
         let strays = strays.unwrap();
         assert!(strays.rows == [8, 24] && strays.exchanged, "{strays:?}");
         assert!(strays.statement(&set).contains("are exchanged"), "{}", strays.statement(&set));
+    }
+
+    #[test]
+    fn a_row_that_another_robot_has_near_is_no_stray() {
+        let world = planned(40, 0, 25.0, 0.03, 3, &|_| {});
+        let truth = &world.truth;
+        let set = Dataset::new(&world.rows).unwrap();
+        let rows = set.rows(|_| true);
+        // As a robot would that is wrong where this pose alone is.
+        let mut spoilt = set.clone();
+        spoilt.poses[9].joints_rad[2] += 0.02;
+        let judge = Judge::plain(&set, &rows, false);
+        let alone = find(&judge, (&[truth], &[&spoilt]), &rows);
+        assert_eq!(alone.map(|strays| strays.rows), Some(vec![9]));
+        assert_eq!(find(&judge, (&[truth, truth], &[&spoilt, &set]), &rows), None);
     }
 }

@@ -13,6 +13,7 @@ use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::linear_algebra::{Eliminated, product, pseudo_inverse};
+use crate::robot::{Joint, Robot};
 
 /// Covariance of the identified parameters, in the units of the file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -64,6 +65,9 @@ pub struct Expected {
     pub poses: String,
     /// From where to where each joint was read there, deg (mm where it slides).
     pub joint_ranges: Vec<[f64; 2]>,
+    /// Joints that were bent so little that the robot is known there only, with their ranges, for a sentence.
+    #[serde(skip)]
+    pub near_only: Vec<String>,
     /// Pose by pose of the file: name and expected length, mm.
     pub map: Vec<(String, f64)>,
 }
@@ -123,6 +127,7 @@ impl Expected {
             stated_mm: stated_mm(set).map(|mm| mm * formulation.rows.scatter.stated.sqrt()),
             freedom: formulation.rows.scatter.freedom,
             poses: region(set),
+            near_only: near_only(nominal, &ranges(set)),
             joint_ranges: ranges(set),
             map: rows.iter().map(length).collect(),
         }
@@ -220,6 +225,27 @@ fn ranges(set: &Dataset) -> Vec<[f64; 2]> {
         if set.is_sliding(j) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
     };
     (0..set.joint_count()).map(range).collect()
+}
+
+/// Over less than this, deg, sine and cosine of an angle are a constant and a line to some per cent, and a link's terms
+/// are hardly told from a zero's.
+const NARROW_DEG: f64 = 30.0;
+
+/// Half of a joint's limits where its file has none, deg.
+const HALF_A_TURN_DEG: f64 = 180.0;
+
+/// Joints but the first, which turns the whole arm, that were bent so little that the robot is known there only, with
+/// their `ranges` in deg.
+fn near_only(nominal: &Robot, ranges: &[[f64; 2]]) -> Vec<String> {
+    let of_joint = |(j, (joint, [low, high])): (usize, (&Joint, &[f64; 2]))| {
+        let limits = joint
+            .limits_rad
+            .map_or((-HALF_A_TURN_DEG, HALF_A_TURN_DEG), |(low, high)| (low.to_degrees(), high.to_degrees()));
+        let left_out = (low - limits.0).max(limits.1 - high);
+        let is_narrow = j > 0 && !joint.slides && high - low < NARROW_DEG && left_out > high - low;
+        is_narrow.then(|| format!("j{} {low:.0}..{high:.0} deg", j + 1))
+    };
+    nominal.joints.iter().zip(ranges).enumerate().filter_map(of_joint).collect()
 }
 
 /// The ranges of the joints that were measured, for a person.

@@ -9,9 +9,8 @@ use super::file::Record;
 use super::findings::{self, Findings};
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
-use super::rounded;
+use super::{rounded, untested};
 use crate::identify::data::dataset::{Dataset, Kind};
-use crate::identify::data::still::constant_joints;
 use crate::identify::data::unused;
 use crate::identify::examine::conventions;
 use crate::identify::examine::in_hand::most_points;
@@ -20,9 +19,6 @@ use crate::identify::judge::errors::Spread;
 use crate::identify::run::{Against, Identification};
 use crate::identify::sensor::REPEATABILITY_MM;
 use crate::robot::{Advice, Robot};
-
-/// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
-const ONE_ORIENTATION_DEG: f64 = 1.0;
 
 /// Error of a nominal robot, mm, beyond which units or robots are mixed up: built robots are off by a few mm.
 const IMPLAUSIBLE_MM: f64 = 20.0;
@@ -39,6 +35,11 @@ impl Record {
             .map(String::as_str)
             .find(|said| !reason.is_empty() && said.starts_with(reason))
             .unwrap_or(reason)
+    }
+
+    /// Whether the robot is known near the poses that were measured only.
+    pub fn is_near_only(&self) -> bool {
+        self.expected.as_ref().is_some_and(|expected| !expected.near_only.is_empty())
     }
 
     /// Fills in the advice, its reason and the warnings.
@@ -63,12 +64,16 @@ impl Record {
         doubts.extend(self.implausible(set, nominal));
         // What speaks against the result is why its figures are odd, whatever the number of rows.
         doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty() && far.is_none()));
-        doubts.extend(still(set));
-        doubts.extend(one_orientation(set, nominal, found));
+        doubts.extend(untested::still(set));
+        doubts.extend(untested::one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));
         let against = findings.against.first().or(far.as_ref()).map(|finding| finding.finding.clone());
+        // A robot file that does not count as the table does is not one to go on with.
+        let mended =
+            findings.doubts.iter().find(|finding| finding.of_joints && computed.is_none()).map(Finding::sentence);
         (self.advice, self.reason) = match (against.or(worse.clone()), &kept, doubts.first()) {
             (Some(reason), ..) => (Advice::DoNotUse, reason),
+            (None, Some(_), _) if mended.is_some() => (Advice::Check, mended.unwrap_or_default()),
             (None, Some(reason), _) => (Advice::KeepNominal, computed.as_ref().unwrap_or(reason).clone()),
             (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
             (None, None, None) => (Advice::Use, String::new()),
@@ -303,34 +308,6 @@ fn of_nominal(figures: &PointSpread) -> Option<Finding> {
 fn size_mm(figures: &PointSpread) -> Option<(f64, f64)> {
     let spread = figures.point.as_ref().unwrap_or(&figures.distance);
     Some((spread.mean_abs_mm?, spread.max_abs_mm?))
-}
-
-/// Several joints that did not move.
-fn still(set: &Dataset) -> Option<String> {
-    let joints = constant_joints(set);
-    (joints.len() > 1).then(|| {
-        format!(
-            "joints {} did not move: the identified robot is right for these readings of theirs only; move every joint between poses",
-            joints.join(", ")
-        )
-    })
-}
-
-/// A flange that hardly turns within a group.
-fn one_orientation(set: &Dataset, nominal: &Robot, found: &Identification) -> Option<String> {
-    (tilt_deg(set, nominal, &found.fitted) < ONE_ORIENTATION_DEG).then(|| {
-        "the flange keeps one orientation within each group: the tool and parts of the wrist cannot be separated from other parameters, and \
-         the identified robot is right for that orientation only; vary it by 20 deg or more between poses"
-            .to_owned()
-    })
-}
-
-/// The largest turn of the nominal flange between two poses of a group (one of them the group's first), deg.
-fn tilt_deg(set: &Dataset, nominal: &Robot, rows: &[usize]) -> f64 {
-    let rotation = |i: usize| nominal.base_from_flange(&set.poses[i].joints_rad).rotation;
-    let mut first = vec![None; set.groups.len()];
-    let turn = |&i: &usize| first[set.poses[i].group].get_or_insert_with(|| rotation(i)).angle_to(&rotation(i));
-    rows.iter().map(turn).fold(0.0, f64::max).to_degrees()
 }
 
 /// A list of which the first are said.

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use crate::identify::data::dataset::Dataset;
+use crate::diagnostic::count as counted;
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
@@ -13,7 +14,7 @@ use crate::identify::judge::pattern;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::judge::uncertainty::stated_mm;
 use crate::identify::record::file::Smooth;
-use crate::identify::record::{left_out, misfits, plausible, rounded};
+use crate::identify::record::{left_out, misfits, plausible, rounded, untested};
 use crate::identify::run::Identification;
 use crate::identify::sensor::Extra;
 
@@ -78,7 +79,9 @@ impl Findings {
             told.any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
         };
         let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
-        let notes = noise.into_iter().chain(of_fit).filter(|finding| !is_told(finding)).collect();
+        let (not_followed, untested) =
+            if set.kind == Kind::Positions { untested::joints(set, found) } else { Default::default() };
+        let notes = noise.into_iter().chain(of_fit).chain(untested).filter(|finding| !is_told(finding)).collect();
         // A scale makes every length another.
         let beyond = plausible::of_links(found)
             .filter(|_| scale.is_none())
@@ -92,6 +95,8 @@ impl Findings {
             .chain(rounded)
             .chain(many)
             .chain(misfits::of_verify(set, found))
+            .chain(untested::copied(set))
+            .chain(not_followed)
             .chain(scale)
             .chain(terms)
             .chain(far_beyond)
@@ -250,6 +255,8 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
     if let Some(finding) = constant {
         add(finding, Vec::new(), "move every joint between poses");
     }
+    list.extend(of_few_to_verify(set, found));
+    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if let Some(finding) = stated_covariances(set, found) {
         add(finding, Vec::new(), "the fit uses the scatter that it found");
     }
@@ -264,6 +271,16 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
         );
     }
     list
+}
+
+/// Rows to verify of which there are too few to judge by.
+fn of_few_to_verify(set: &Dataset, found: &Identification) -> Option<Finding> {
+    let rows = set.verify_rows();
+    (!rows.is_empty() && !found.deletions.is_empty()).then(|| {
+        let said = format!("{} to verify: too few to judge a robot by", counted(rows.len(), "row"));
+        let action = "each fitted row is judged by a fit that it was left out of instead";
+        Finding::new(said, action).about(set.names(&rows))
+    })
 }
 
 /// Sessions and drifts.

@@ -11,6 +11,7 @@ mod plausible;
 mod quality;
 mod rounded;
 mod touched;
+mod untested;
 
 pub use crate::robot::Advice;
 pub use file::{Record, Smooth};

@@ -44,8 +44,8 @@ pub fn of_links(found: &Identification) -> Option<Finding> {
         format!(
             "links are found farther from the robot file's than makers build them ({far}; half of the lengths are within {usual_mm:.1} mm)"
         ),
-        "compare the robot file with the pendant or the data sheet: where the controller has what was found, mend the file and identify again, for \
-         targets that are compensated from a wrong file become worse",
+        "compare the robot file with the pendant or the data sheet (theta_i and d_i are of its i-th [[joint]], alpha_i and a_i of the one after): where \
+         the controller has what was found, mend the file and identify again, for targets that are compensated from a wrong file become worse",
     ))
 }
 

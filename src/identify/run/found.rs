@@ -113,7 +113,8 @@ impl Identification {
         self.chosen = self.candidates.len() - 1;
         self.terms = Terms::NOMINAL;
     }
-    /// Rows by which robots are judged: those to verify, without any all that were fitted.
+
+    /// Rows by which robots are judged: those to verify, with too few of them all that were fitted.
     pub fn judged_rows(&self, set: &Dataset) -> Vec<usize> {
         if self.deletions.is_empty() {
             return set.verify_rows();

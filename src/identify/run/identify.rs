@@ -29,6 +29,9 @@ use crate::robot::Robot;
 /// Numbers a parameter that a model needs to tell gross errors by: with fewer, a fit follows them.
 const ROWS_TELL: f64 = 2.0;
 
+/// Verify rows with fewer of which a robot is judged by fits without some of the rows: one or two say nothing.
+const FEWEST_TO_VERIFY: usize = 3;
+
 /// Costs within this of each other are one: they come from different sums of the same squares.
 const SAME_COST: f64 = 1e-6;
 
@@ -210,7 +213,8 @@ impl Session<'_> {
             let validations = self.validations(&parameters, &formulation, formulation.rows.scatter);
             formulation.common = validations[0].common_factor(&parameters);
         }
-        let deletions = if self.set.verify_rows().is_empty() { self.deletions(&formulation) } else { Vec::new() };
+        let deletions =
+            if self.set.verify_rows().len() < FEWEST_TO_VERIFY { self.deletions(&formulation) } else { Vec::new() };
         let run = |method: &Method| {
             (self.step)(&format!("{} on {}", method.name(), model.name()));
             self.solved(&formulation, *method)

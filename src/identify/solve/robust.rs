@@ -192,6 +192,11 @@ impl Robust<'_> {
         typical_mm(&self.residuals())
     }
 
+    /// Numbers measured, less the unknowns.
+    pub fn free_numbers(&self) -> usize {
+        self.rows().count().saturating_sub(self.x.len())
+    }
+
     /// What residuals that were fitted have lost: root of numbers over degrees of freedom.
     fn freedom(&self, residuals: &[Residual], rows: &Rows) -> f64 {
         let numbers: usize = residuals.iter().map(|r| r.count).sum();

@@ -109,7 +109,8 @@ pub(in crate::measurements) fn unplaced(parts: &[Part], picked: &Picked, forced:
     }
     let hint = format!(
         "{}see whether the file of `--robot` is of this robot; if it is, `--columns` names the {} columns{} in their order: j1 to j{count} for \
-         the joints, x, y, z for the point, `-` for each that is neither",
+         the joints, x, y, z for the point, `-` for each that is neither, and `--units deg,mm` (rad, m) their units: a column that is spoilt is \
+         then looked for",
         lying(parts, count),
         parts.iter().map(Part::width_of_file).sum::<usize>(),
         side_by_side(parts)
@@ -193,6 +194,9 @@ pub(in crate::measurements) fn no_unit(parts: &[Part], joints: Option<Unit>, len
     let flags: Vec<String> = either(joints, [Unit::Deg, Unit::Rad]).into_iter().flat_map(of_joints).collect();
     parts[0].refuse(
         message,
-        Some(&format!("{} says it; look at `--robot`, too: its file must be of this robot", flags.join(" or "))),
+        Some(&format!(
+            "{} says it, and a column that is spoilt is then looked for; look at `--robot`, too: its file must be of this robot",
+            flags.join(" or ")
+        )),
     )
 }

@@ -95,6 +95,7 @@ fn verification(set: &Dataset, record: &Record, before: &[RowError], after: &[Ro
 /// Whether to use the robot, with the errors before and after and what to expect.
 fn verdict(record: &Record) -> Markup {
     let (tone, word) = match record.advice {
+        Advice::Use if record.is_near_only() => (Tone::Good, "Use the identified robot near these poses only"),
         Advice::Use => (Tone::Good, "Use the identified robot"),
         Advice::Check => (Tone::Doubtful, "Check before use"),
         Advice::KeepNominal => (Tone::Doubtful, "Keep the nominal robot"),

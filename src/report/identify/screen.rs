@@ -9,21 +9,14 @@ use crate::identify::judge::errors::Spread;
 use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{Advice, PointSpread, Record};
 use crate::report::table::{Table, number};
+use crate::robot::Robot;
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
-use crate::robot::{Joint, Robot};
-
-/// Over less than this, deg, sine and cosine of an angle are a constant and a line to some per cent, and a link's terms
-/// are hardly told from a zero's.
-const NARROW_DEG: f64 = 30.0;
-
-/// Half of a joint's limits where its file has none, deg.
-const HALF_A_TURN_DEG: f64 = 180.0;
 
 /// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written,
 /// and what to do with it. `robot` is the file of the nominal robot, which comes before the identified one.
 pub fn summary(
     record: &Record,
-    (robot, nominal, identified): (Option<&Utf8Path>, &Robot, &Robot),
+    (robot, identified): (Option<&Utf8Path>, &Robot),
     is_placed: bool,
     out: &OutDir,
 ) -> String {
@@ -38,7 +31,7 @@ pub fn summary(
     if let Some(expected) = &record.expected {
         lines.push(expected.sentence());
         lines.push(expected.parts());
-        lines.extend(known_near(expected, nominal));
+        lines.extend(known_near(expected));
     }
     lines.push(String::new());
     lines.push(kept(record));
@@ -65,6 +58,7 @@ pub(super) fn is_corrected(record: &Record) -> bool {
 pub(super) fn advice(record: &Record) -> String {
     let file = "the identified robot";
     match record.advice {
+        Advice::Use if record.is_near_only() => format!("use {file} near these poses only"),
         Advice::Use => format!("use {file}"),
         Advice::Check => format!("check before you use {file}: {}", record.whole_reason()),
         Advice::KeepNominal => record.whole_reason().to_owned(),
@@ -113,22 +107,12 @@ pub(super) fn of_tool(record: &Record) -> Option<String> {
     ))
 }
 
-/// Joints but the first, which turns the whole arm, that were bent so little that the robot is known there only.
-fn known_near(expected: &Expected, nominal: &Robot) -> Option<String> {
-    let of_joint = |(j, (joint, [low, high])): (usize, (&Joint, &[f64; 2]))| {
-        let limits = joint
-            .limits_rad
-            .map_or((-HALF_A_TURN_DEG, HALF_A_TURN_DEG), |(low, high)| (low.to_degrees(), high.to_degrees()));
-        let left_out = (low - limits.0).max(limits.1 - high);
-        let is_narrow = j > 0 && !joint.slides && high - low < NARROW_DEG && left_out > high - low;
-        is_narrow.then(|| format!("j{} {low:.0}..{high:.0} deg", j + 1))
-    };
-    let joints: Vec<String> =
-        nominal.joints.iter().zip(&expected.joint_ranges).enumerate().filter_map(of_joint).collect();
-    (!joints.is_empty()).then(|| {
+/// Where the robot is known.
+fn known_near(expected: &Expected) -> Option<String> {
+    (!expected.near_only.is_empty()).then(|| {
         format!(
             "known near these poses only ({}): targets elsewhere need poses there (`stereocal guide poses`)",
-            joints.join(", ")
+            expected.near_only.join(", ")
         )
     })
 }

@@ -6,6 +6,7 @@
 //! `right_from_left` at each pair, as for the poses of a run.
 
 use nalgebra::DMatrix;
+use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
 use crate::imaging::Board;
 use crate::stereo::board_pose::answer::POSE_LIMIT;
@@ -45,18 +46,40 @@ pub fn stray_limit(farthest_pair: Option<f64>) -> f64 {
     POSE_LIMIT.max(BEYOND * farthest_pair.unwrap_or(0.0))
 }
 
+/// How the pairs of a calibration scatter about its rig.
+#[derive(Debug, Clone, Copy)]
+pub struct Usual {
+    /// See [`pair_excess`].
+    pub excess: f64,
+    /// See [`farthest_pair`].
+    pub farthest_pair: Option<f64>,
+    /// How many pairs told both.
+    pub pairs: Option<usize>,
+}
+
+impl Usual {
+    /// Beyond which a change at a pair that took no part lowers chi-square by more than such pairs do: of few pairs the
+    /// excess itself is uncertain, so that the ratio has an F distribution.
+    fn limit(&self) -> f64 {
+        const CHANGE: f64 = 6.0;
+        let limit = stray_limit(self.farthest_pair);
+        let Some(pairs) = self.pairs else { return limit };
+        // A mean square of so many numbers is as uncertain as the median of the pairs.
+        let freedom = 2.0 * pairs as f64 / (CHANCE / 2.0).powi(2);
+        let law = FisherSnedecor::new(CHANGE, freedom);
+        let chance = ChiSquared::new(CHANGE).map(|one| one.cdf(POSE_LIMIT));
+        let of_few = law.ok().zip(chance.ok()).map(|(law, chance)| CHANGE * law.inverse_cdf(chance));
+        of_few.map_or(limit, |of_few| limit.max(of_few))
+    }
+}
+
 /// The pairs that contradict a rig that they did not help to find, at the values of the problem: a change of
 /// `right_from_left` at the pair alone gains more than pairs of this rig are known to differ by. `rig` is the rig's
 /// covariance in the layout's order.
-pub fn strays(
-    problem: &Problem,
-    board: &Board,
-    layout: &Layout,
-    rig: &DMatrix<f64>,
-    (excess, farthest_pair): (f64, Option<f64>),
-) -> Vec<usize> {
+pub fn strays(problem: &Problem, board: &Board, layout: &Layout, rig: &DMatrix<f64>, usual: Usual) -> Vec<usize> {
     let gains = gains(problem, board, layout, of_outsider, |_| Some(rig.clone())).unwrap_or_default();
-    let beyond = |change: &Change| change.fall > stray_limit(farthest_pair) * excess;
+    let limit = usual.limit() * usual.excess;
+    let beyond = |change: &Change| change.fall > limit;
     let of_pair = |(pair, change): (usize, &Option<Change>)| change.as_ref().filter(|c| beyond(c)).map(|_| pair);
     gains.iter().enumerate().filter_map(of_pair).collect()
 }
@@ -91,4 +114,21 @@ fn gains(
     let mut whole = DMatrix::zeros(size, size);
     whole.view_mut((0, 0), (n, n)).copy_from(&rig);
     Some(parts.iter().map(|part| gain(part, &whole)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_limit_of_a_stray_is_the_wider_the_fewer_pairs_told_the_excess() {
+        let limit = |pairs, farthest_pair| Usual { excess: 1.0, farthest_pair, pairs }.limit();
+        // Quantiles of F with 6 and 3.56 n degrees of freedom, from scipy 1.15, times 6.
+        for (pairs, expected) in [(7, 110.40), (20, 60.60), (200, 46.32)] {
+            let found = limit(Some(pairs), None);
+            assert!((found / expected - 1.0).abs() < 2e-3, "{pairs}: {found}");
+        }
+        assert_eq!(limit(None, None), POSE_LIMIT);
+        assert_eq!(limit(Some(200), Some(100.0)), 200.0);
+    }
 }

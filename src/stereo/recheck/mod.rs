@@ -22,6 +22,7 @@ pub use self::strays::Stray;
 use crate::difference::Difference;
 use crate::imaging::{Board, Corners, Skipped};
 use crate::stereo::Error;
+use crate::stereo::board_pose::pair_excess::Usual;
 use crate::stereo::data::{Noise, View, in_use};
 use crate::stereo::findings::hypothesis;
 use crate::stereo::init::board_pose::{self, misfit_px};
@@ -157,7 +158,8 @@ fn strays(
         *pose = board_pose::follow(&problem.values.shared, view, *pose).unwrap_or(*pose);
     }
     let Some(rig) = before.covariance(layout) else { return Vec::new() };
-    let usual = (before.pair_excess, before.farthest_pair);
+    let Before { pair_excess: excess, farthest_pair, pairs, .. } = *before;
+    let usual = Usual { excess, farthest_pair, pairs };
     strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 

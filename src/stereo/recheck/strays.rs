@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::diagnostic::two_digits;
 use crate::imaging::Board;
 use crate::imaging::corners::named;
-use crate::stereo::board_pose::pair_excess;
+use crate::stereo::board_pose::pair_excess::{self, Usual};
 use crate::stereo::model::rig::Rig;
 use crate::stereo::model::{Layout, Values};
 use crate::stereo::solve::levenberg_marquardt::Search;
@@ -26,12 +26,12 @@ pub struct Stray {
     pub effect_mm: f64,
 }
 
-/// Finds them at the values of the problem. `rig`: the old rig's covariance; `usual`: see [`pair_excess::strays`].
+/// Finds them at the values of the problem. `rig`: the old rig's covariance; `usual`: how its own pairs scatter.
 pub fn find(
     problem: &Problem,
     (board, layout): (&Board, &Layout),
     rig: &DMatrix<f64>,
-    usual: (f64, Option<f64>),
+    usual: Usual,
     lengths: &VolumeLengths,
 ) -> Vec<Stray> {
     let off_mm = |own: &Rig| {

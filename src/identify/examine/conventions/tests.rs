@@ -220,3 +220,73 @@ fn what_makes_no_error_fall_is_not_told_of_another_arm() {
         }
     }
 }
+
+/// An arm that is off by what a good one is off, with a target this far off its last axis.
+fn near_the_axis(off_mm: f64) -> (World, Vec<Measurement>) {
+    let world = planned(40, 20, 25.0, 0.02, 7, &|robot| {
+        robot.tool_mm = nalgebra::Vector3::new(off_mm, 0.0, 120.0);
+        for (i, joint) in robot.joints.iter_mut().enumerate() {
+            joint.theta_rad += 1e-3 * (1.0 + i as f64).sin();
+            joint.a_mm += 0.3 * (2.0 + i as f64).cos();
+        }
+    });
+    let rows = world.rows.clone();
+    (world, rows)
+}
+
+#[test]
+fn what_the_last_joint_reads_is_named_though_it_moves_the_target_little() {
+    let spoilt = |rows: &[Measurement]| {
+        let one_late = {
+            let mut late = rows.to_vec();
+            late.iter_mut().skip(1).zip(rows).for_each(|(row, before)| row.at.joints_deg[5] = before.at.joints_deg[5]);
+            late
+        };
+        [
+            (joints(rows, |q| q[5] = -q[5]), "joint 6 is counted the other way round"),
+            (joints(rows, |q| q[5] = q[5].to_radians()), "the angles of joint 6 are in radians"),
+            (one_late, "joint 6 lags 1 row"),
+        ]
+    };
+    for off_mm in [0.5, 1.5, 4.0] {
+        let (world, rows) = near_the_axis(off_mm);
+        assert_eq!(said(&rows, &world.nominal), [""; 0], "clean, {off_mm} mm off the axis");
+        for (wrong, word) in spoilt(&rows) {
+            let said = said(&wrong, &world.nominal);
+            assert!(said.len() == 1 && said[0].contains(word), "{word}, {off_mm} mm off the axis: {said:?}");
+        }
+    }
+    // On the axis nothing tells, and nothing is lost.
+    let (world, rows) = near_the_axis(0.0);
+    for (wrong, word) in spoilt(&rows) {
+        assert_eq!(said(&wrong, &world.nominal), [""; 0], "{word}");
+    }
+}
+
+#[test]
+fn points_of_two_days_are_no_column_of_the_last_joint() {
+    for (off_mm, seed) in [(0.0, 1), (0.0, 2), (0.1, 3)] {
+        let (world, rows) = near_the_axis(off_mm);
+        for by_mm in [0.3, 1.0] {
+            let moved = shifted(&rows, |i| if (i * i + seed * i) % 3 == 0 { by_mm } else { 0.0 });
+            assert_eq!(said(&moved, &world.nominal), [""; 0], "{off_mm} mm off the axis, {by_mm} mm in x");
+        }
+    }
+}
+
+#[test]
+fn of_two_robots_that_explain_about_as_well_neither_is_the_cause() {
+    let misfit = |nominal, left| Misfit { nominal, target: 0.5, fitted: left, left, free: 100 };
+    let mut tried = vec![
+        (misfit(1.0, 0.2), Hypothesis::Twisted(1)),
+        (misfit(1.01, 0.2), Hypothesis::Negated(0)),
+        (misfit(5.0, 0.2), Hypothesis::Negated(3)),
+    ];
+    let best = Likeliest::of(&tried).unwrap();
+    assert_eq!((best.hypothesis, best.rivals.len()), (Hypothesis::Negated(0), 0));
+    assert_eq!(best.like, [Hypothesis::Twisted(1)]);
+    tried.push((misfit(1.5, 0.3), Hypothesis::Coupled(2, 1.0)));
+    let best = Likeliest::of(&tried).unwrap();
+    assert_eq!(best.rivals, [Hypothesis::Coupled(2, 1.0)]);
+    assert!(best.open().finding.contains("joint 1 is counted the other way round"));
+}
