@@ -113,13 +113,11 @@ impl Hypothesis {
         }
     }
 
-    /// The joint that it is about, where it is about what one reads.
+    /// The joint that it is about, where it is about what one reads but for a zero, which of a joint that moves the
+    /// target little is the target's.
     pub fn of_one_joint(self) -> Option<usize> {
         match self {
-            Hypothesis::JointRadians(i)
-            | Hypothesis::Negated(i)
-            | Hypothesis::Offset(i, _)
-            | Hypothesis::Lagging(Some(i), _) => Some(i),
+            Hypothesis::JointRadians(i) | Hypothesis::Negated(i) | Hypothesis::Lagging(Some(i), _) => Some(i),
             _ => None,
         }
     }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::diagnostic::count as counted;
-use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::data::repeats::Repeats;
 use crate::identify::data::still::{constant_joints, repeated};
 use crate::identify::examine::conventions;
@@ -79,8 +79,7 @@ impl Findings {
             told.any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
         };
         let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
-        let (not_followed, untested) =
-            if set.kind == Kind::Positions { untested::joints(set, found) } else { Default::default() };
+        let (doubted, untested) = untested::joints(set, found);
         let notes = noise.into_iter().chain(of_fit).chain(untested).filter(|finding| !is_told(finding)).collect();
         // A scale makes every length another.
         let beyond = plausible::of_links(found)
@@ -95,8 +94,7 @@ impl Findings {
             .chain(rounded)
             .chain(many)
             .chain(misfits::of_verify(set, found))
-            .chain(untested::copied(set))
-            .chain(not_followed)
+            .chain(doubted)
             .chain(scale)
             .chain(terms)
             .chain(far_beyond)

@@ -4,7 +4,7 @@
 //! A column that is wrong (another unit, another sign, other rows) makes a fit put the target on the joint's axis,
 //! where it fits as well.
 
-use crate::identify::data::dataset::Dataset;
+use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::still::{self, constant_joints};
 use crate::identify::examine::conventions;
 use crate::identify::finding::Finding;
@@ -18,11 +18,14 @@ const TESTED: f64 = 2.0 * crate::difference::TOLD_APART + 2.0;
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
+/// From its middle, rad or mm: a joint that turns by less stands still.
+const HARDLY: f64 = 0.01;
+
 /// Times as far as the target that was found by which a joint would move the file's target where one of both is wrong.
 const ELSEWHERE: f64 = 4.0;
 
 /// Joints that read the same in all rows though they move: one column is a copy of the other.
-pub fn copied(set: &Dataset) -> Option<Finding> {
+fn copied(set: &Dataset) -> Option<Finding> {
     let joints = set.joint_count();
     let all: Vec<usize> = (0..set.poses.len()).collect();
     let same = |&(i, j): &(usize, usize)| {
@@ -37,16 +40,16 @@ pub fn copied(set: &Dataset) -> Option<Finding> {
 
 /// What is said of the joints that are not tested: what speaks against their columns, and what is only not known.
 pub fn joints(set: &Dataset, found: &Identification) -> (Vec<Finding>, Vec<Finding>) {
-    let one_point = set.poses.iter().all(|pose| pose.on_body_mm.is_none());
-    let Some(formulation) = found.formulation().filter(|_| one_point) else { return Default::default() };
+    let (mut against, mut unknown): (Vec<Finding>, _) = (copied(set).into_iter().collect(), Vec::new());
+    let one_point = set.kind == Kind::Positions && set.poses.iter().all(|pose| pose.on_body_mm.is_none());
+    let Some(formulation) = found.formulation().filter(|_| one_point) else { return (against, unknown) };
     let nominal = &formulation.rows.kinematics.nominal;
-    let (mut against, mut unknown) = (Vec::new(), Vec::new());
     for joint in 0..set.joint_count() {
         let moves = |robot: &Robot| still::moves_mm(set, robot, &found.fitted, joint);
         let (expected_mm, found_mm) = (moves(nominal), moves(found.robot()));
         let chi_square = 3.0 * found.fitted.len() as f64 * (found_mm / found.scatter.point_mm).powi(2);
         let is_tested = chi_square > TESTED && found_mm > found.scatter.point_mm;
-        if still::turn(set, &found.fitted, joint) == 0.0 || is_tested {
+        if still::turn(set, &found.fitted, joint) < HARDLY || is_tested {
             continue;
         }
         let number = joint + 1;
