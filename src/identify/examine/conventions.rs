@@ -104,7 +104,8 @@ struct Likeliest {
     hypothesis: Hypothesis,
     /// Those that these readings do not tell from it: a fit leaves as much, and the file's robot is about as near.
     like: Vec<Hypothesis>,
-    /// Those of which the file's robot is nearly as near and a fit leaves something else: then none of them is the cause.
+    /// Those of which the file's robot is about as near and a fit leaves something else, and for which some figure
+    /// speaks: then none of them is the cause.
     rivals: Vec<Hypothesis>,
 }
 
@@ -122,7 +123,8 @@ impl Likeliest {
         };
         let is_near = |other: &Misfit, times: f64| other.product() < times * there.product();
         let like = of(&|other| other.fits_like(&there) && is_near(other, ALIKE));
-        let rivals = of(&|other| !other.fits_like(&there) && is_near(other, EXPLAINS));
+        let rivals =
+            of(&|other| !other.fits_like(&there) && is_near(other, EXPLAINS) && !there.is_nearer_in_all(other));
         Some(Likeliest { there, hypothesis, like, rivals })
     }
 

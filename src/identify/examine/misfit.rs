@@ -148,6 +148,11 @@ impl Misfit {
         self.nominal * self.target * self.fitted
     }
 
+    /// Whether nothing speaks for the other: neither the file's robot, nor its links, nor a fit.
+    pub fn is_nearer_in_all(&self, other: &Misfit) -> bool {
+        self.nominal <= other.nominal && self.target <= other.target && self.left <= other.left
+    }
+
     /// Whether two fits leave as much, as of a shoulder turned over and of a base that turns the other way.
     pub fn fits_like(&self, other: &Misfit) -> bool {
         let odds = self.free.min(other.free) as f64 * (self.left / other.left).ln();

@@ -285,7 +285,10 @@ fn of_two_robots_that_explain_about_as_well_neither_is_the_cause() {
     let best = Likeliest::of(&tried).unwrap();
     assert_eq!((best.hypothesis, best.rivals.len()), (Hypothesis::Negated(0), 0));
     assert_eq!(best.like, [Hypothesis::Twisted(1)]);
-    tried.push((misfit(1.5, 0.3), Hypothesis::Coupled(2, 1.0)));
+    // One that is worse in all is none; one whose links are nearer is.
+    tried.push((misfit(1.5, 0.3), Hypothesis::Coupled(1, 1.0)));
+    assert!(Likeliest::of(&tried).unwrap().rivals.is_empty());
+    tried.push((Misfit { target: 0.4, ..misfit(1.5, 0.3) }, Hypothesis::Coupled(2, 1.0)));
     let best = Likeliest::of(&tried).unwrap();
     assert_eq!(best.rivals, [Hypothesis::Coupled(2, 1.0)]);
     assert!(best.open().finding.contains("joint 1 is counted the other way round"));
