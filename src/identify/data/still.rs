@@ -44,27 +44,29 @@ pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
     rows
 }
 
+/// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.
+pub const STILL: f64 = 0.02;
+
+/// From its least to its largest reading, rad or mm.
+pub fn way(set: &Dataset, joint: usize) -> f64 {
+    let ends = |(low, high): (f64, f64), q: f64| (low.min(q), high.max(q));
+    let (low, high) =
+        set.poses.iter().map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    high - low
+}
+
 /// Joints that do not move, by their numbers from 1.
 pub fn constant_joints(set: &Dataset) -> Vec<String> {
-    let Some(first) = set.poses.first() else { return Vec::new() };
-    let constant = |j: &usize| set.poses.iter().all(|p| (p.joints_rad[*j] - first.joints_rad[*j]).abs() <= SAME_JOINT);
-    (0..set.joint_count()).filter(constant).map(|joint| (joint + 1).to_string()).collect()
+    (0..set.joint_count())
+        .filter(|&j| (0.0..=SAME_JOINT).contains(&way(set, j)))
+        .map(|joint| (joint + 1).to_string())
+        .collect()
 }
 
-/// The joint's value in the middle of these rows.
-fn middle(set: &Dataset, rows: &[usize], joint: usize) -> f64 {
-    rows.iter().map(|&row| set.poses[row].joints_rad[joint]).sum::<f64>() / rows.len().max(1) as f64
-}
-
-/// How far the joint turns (or slides) at the most from its middle, rad or mm.
-pub fn turn(set: &Dataset, rows: &[usize], joint: usize) -> f64 {
-    let middle = middle(set, rows, joint);
-    rows.iter().map(|&row| (set.poses[row].joints_rad[joint] - middle).abs()).fold(0.0, f64::max)
-}
-
-/// How far the target is from where it would be if the joint stood still, mm a coordinate, root of the mean square.
+/// How far the target is from where it would be if the joint stood still in the middle of these rows, mm a coordinate,
+/// root of the mean square.
 pub fn moves_mm(set: &Dataset, robot: &Robot, rows: &[usize], joint: usize) -> f64 {
-    let middle = middle(set, rows, joint);
+    let middle = rows.iter().map(|&row| set.poses[row].joints_rad[joint]).sum::<f64>() / rows.len().max(1) as f64;
     let square = |&row: &usize| {
         let joints = &set.poses[row].joints_rad;
         let mut still = joints.clone();

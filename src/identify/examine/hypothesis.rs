@@ -4,6 +4,7 @@
 use nalgebra::{Rotation3, Vector3};
 
 use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
+use crate::identify::data::still::{STILL, way};
 use crate::robot::Robot;
 use crate::tables::names::Unit;
 
@@ -38,19 +39,8 @@ pub enum Hypothesis {
     Mirrored,
 }
 
-/// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.
-const STILL: f64 = 0.02;
-
 /// Sine of a twist whose sign matters: a smaller one is an error of manufacture.
 const LEAST_TWIST: f64 = 0.1;
-
-/// How far a joint moves, rad or mm.
-fn way(set: &Dataset, joint: usize) -> f64 {
-    let ends = |(low, high): (f64, f64), q: f64| (low.min(q), high.max(q));
-    let (low, high) =
-        set.poses.iter().map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
-    high - low
-}
 
 /// Joints that hardly move: what is said of their columns the tool's place undoes.
 pub fn still(set: &Dataset) -> Vec<usize> {

@@ -71,11 +71,11 @@ impl Record {
         // A robot file that does not count as the table does is not one to go on with.
         let mended =
             findings.doubts.iter().find(|finding| finding.of_joints && computed.is_none()).map(Finding::sentence);
-        (self.advice, self.reason) = match (against.or(worse.clone()), &kept, doubts.first()) {
+        let doubt = if kept.is_some() { mended } else { doubts.first().cloned() };
+        (self.advice, self.reason) = match (against.or(worse.clone()), doubt, &kept) {
             (Some(reason), ..) => (Advice::DoNotUse, reason),
-            (None, Some(_), _) if mended.is_some() => (Advice::Check, mended.unwrap_or_default()),
-            (None, Some(reason), _) => (Advice::KeepNominal, computed.as_ref().unwrap_or(reason).clone()),
-            (None, None, Some(doubt)) => (Advice::Check, doubt.clone()),
+            (None, Some(doubt), _) => (Advice::Check, doubt),
+            (None, None, Some(reason)) => (Advice::KeepNominal, computed.as_ref().unwrap_or(reason).clone()),
             (None, None, None) => (Advice::Use, String::new()),
         };
         self.is_beyond = self.advice == Advice::Check && findings.beyond.is_some();

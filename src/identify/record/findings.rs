@@ -215,7 +215,8 @@ fn of_sensor(found: &Identification) -> Vec<Finding> {
 
 /// What the rows hold, and what their covariances state.
 fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
-    let mut list: Vec<Finding> = set.repeats.iter().filter_map(Repeats::finding).collect();
+    let mut list: Vec<Finding> =
+        set.repeats.iter().filter_map(Repeats::finding).chain(of_few_to_verify(set, found)).collect();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if !set.floored.is_empty() {
         add(
@@ -253,8 +254,6 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
     if let Some(finding) = constant {
         add(finding, Vec::new(), "move every joint between poses");
     }
-    list.extend(of_few_to_verify(set, found));
-    let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     if let Some(finding) = stated_covariances(set, found) {
         add(finding, Vec::new(), "the fit uses the scatter that it found");
     }

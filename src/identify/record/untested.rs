@@ -18,18 +18,14 @@ const TESTED: f64 = 2.0 * crate::difference::TOLD_APART + 2.0;
 /// Orientations within this are one: a robot keeps an orientation to far less, and so small a turn shows nothing.
 const ONE_ORIENTATION_DEG: f64 = 1.0;
 
-/// From its middle, rad or mm: a joint that turns by less stands still.
-const HARDLY: f64 = 0.01;
-
 /// Times as far as the target that was found by which a joint would move the file's target where one of both is wrong.
 const ELSEWHERE: f64 = 4.0;
 
 /// Joints that read the same in all rows though they move: one column is a copy of the other.
 fn copied(set: &Dataset) -> Option<Finding> {
     let joints = set.joint_count();
-    let all: Vec<usize> = (0..set.poses.len()).collect();
     let same = |&(i, j): &(usize, usize)| {
-        still::turn(set, &all, i) > 0.0 && set.poses.iter().all(|pose| pose.joints_rad[i] == pose.joints_rad[j])
+        still::way(set, i) > 0.0 && set.poses.iter().all(|pose| pose.joints_rad[i] == pose.joints_rad[j])
     };
     let (i, j) = (0..joints).flat_map(|i| (i + 1..joints).map(move |j| (i, j))).find(same)?;
     Some(Finding::new(
@@ -49,7 +45,7 @@ pub fn joints(set: &Dataset, found: &Identification) -> (Vec<Finding>, Vec<Findi
         let (expected_mm, found_mm) = (moves(nominal), moves(found.robot()));
         let chi_square = 3.0 * found.fitted.len() as f64 * (found_mm / found.scatter.point_mm).powi(2);
         let is_tested = chi_square > TESTED && found_mm > found.scatter.point_mm;
-        if still::turn(set, &found.fitted, joint) < HARDLY || is_tested {
+        if still::way(set, joint) < still::STILL || is_tested {
             continue;
         }
         let number = joint + 1;
