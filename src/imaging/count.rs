@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use camino::Utf8PathBuf;
 use rayon::prelude::*;
 
 use super::detect::count::{Seen, squares_of};
 use super::image::{self, Claim};
 use super::input::pairs::Pairing;
-use super::{Error, Mosaic, Result, Squares};
+use super::{Error, Mosaic, Result, Skipped, Squares};
 use crate::progress;
 
 /// Pictures in which a count must be seen at least.
@@ -31,16 +32,17 @@ pub struct Counted {
 pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counted> {
     let paths: Vec<_> = pairing.pairs.iter().flat_map(|files| [&files.left, &files.right]).collect();
     let bar = progress::bar("counting the board's squares", paths.len() as u64);
-    let seen: Vec<Option<Seen>> = paths
+    let looks: Vec<Result<Option<Seen>, String>> = paths
         .par_iter()
         .map(|path| {
             bar.inc(1);
-            let header = image::header(path).ok()?;
+            let header = image::header(path)?;
             let _claim = Claim::wait(&header);
-            squares_of(&image::decode(&image::read(path, &header).ok()?, path, mosaic).ok()?)
+            Ok(squares_of(&image::decode(&image::read(path, &header)?, path, mosaic)?))
         })
         .collect();
     bar.finish_and_clear();
+    let seen: Vec<Option<Seen>> = looks.iter().map(|look| *look.as_ref().ok()?).collect();
     let counts = |ends: bool| {
         let mut counts: Counts = BTreeMap::new();
         for squares in seen.iter().flatten().filter(|seen| seen.ends || !ends).map(|seen| seen.squares) {
@@ -53,7 +55,17 @@ pub fn count_squares(pairing: &Pairing, mosaic: Option<Mosaic>) -> Result<Counte
         path: pairing.place.clone(),
         counts: whole.into_iter().collect(),
         of,
+        unread: unread(&paths, &looks),
     })
+}
+
+/// The pictures that could not be read, and why.
+fn unread(paths: &[&Utf8PathBuf], looks: &[Result<Option<Seen>, String>]) -> Vec<Skipped> {
+    let of = |(path, look): (&&Utf8PathBuf, &Result<Option<Seen>, String>)| {
+        let reason = look.as_ref().err()?.clone();
+        Some(Skipped { pair: path.file_name().unwrap_or_default().to_owned(), reason })
+    };
+    paths.iter().zip(looks).filter_map(of).collect()
 }
 
 /// In how many pictures columns and rows of squares were counted.

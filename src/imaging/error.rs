@@ -6,6 +6,7 @@ use super::board::{self, Board, Kind};
 use super::coded::measures::other_size_mm;
 use super::coded::{HAS_MARKERS, HAS_TAGS};
 use super::corners::{Skipped, reasons, too_few};
+use super::image::{DRAWN, UNDECODABLE};
 use crate::diagnostic::Explain;
 
 /// Result of looking for corners.
@@ -63,13 +64,15 @@ pub enum Error {
         skipped: Vec<Skipped>,
     },
     /// The pictures do not tell how many squares the board has.
-    #[error("the board's squares cannot be counted: {}", tally(.counts, *.of))]
+    #[error("the board's squares cannot be counted: {}{}", tally(.counts, *.of), reasons(.unread))]
     NotCounted {
         path: Utf8PathBuf,
         /// Columns and rows of whole boards that were seen, and in how many pictures.
         counts: Vec<((usize, usize), usize)>,
         /// Pictures in all.
         of: usize,
+        /// Those that could not be read, and why.
+        unread: Vec<Skipped>,
     },
     /// The board was not found often enough.
     #[error("{} pairs show {}; {}{}{}", too_few(*.found, *.total), shown(.board), at_least(*.needed), reasons(.skipped), the_rest(*.not_searched))]
@@ -174,6 +177,7 @@ impl Explain for Error {
             }
             Error::SameName { .. } => Some("remove or rename one of them".to_owned()),
             Error::NoneReadable { .. } => Some(SAVED_AS.to_owned()),
+            Error::NotCounted { of, unread, .. } if 2 * unread.len() > *of => Some(SAVED_AS.to_owned()),
             Error::NotCounted { counts, .. } => {
                 let none = if counts.is_empty() { "; grids of circles are not read" } else { "" };
                 Some(format!("count them: `--squares 20x20` is a board with 19x19 inner corners; one with markers needs `--board`{none}"))
@@ -187,8 +191,8 @@ impl Explain for Error {
 
 /// What to do where a board was not found in enough pairs.
 fn of_too_few([found, total, needed]: [usize; 3], board: &Board, skipped: &[Skipped], other: Option<&Board>) -> String {
-    let is_undecodable = |s: &&Skipped| s.reason.contains(super::image::UNDECODABLE);
-    if 2 * skipped.iter().filter(is_undecodable).count() > skipped.len() {
+    let is_unread = |s: &&Skipped| [UNDECODABLE, DRAWN].iter().any(|words| s.reason.contains(words));
+    if 2 * skipped.iter().filter(is_unread).count() > skipped.len() {
         return SAVED_AS.to_owned();
     }
     match other {

@@ -79,6 +79,41 @@ fn broken_pictures_are_skipped_with_their_reasons() {
     assert!((200..361).contains(&left), "{left}");
 }
 
+/// Rings of the colours in which OpenCV draws the corners that it found.
+fn drawn_over(path: &Path) {
+    let mut picture = image::open(path).unwrap().to_rgb8();
+    let (w, h) = picture.dimensions();
+    for (row, colour) in [[255, 0, 0], [255, 128, 0], [200, 200, 0], [0, 255, 0]].into_iter().enumerate() {
+        for k in 0..10 * 24 {
+            let turn = f64::from(k % 24) * std::f64::consts::TAU / 24.0;
+            let (x, y) = (f64::from(w) * (0.25 + 0.05 * f64::from(k / 24)), f64::from(h) * (0.3 + 0.1 * row as f64));
+            picture.put_pixel((x + 4.0 * turn.cos()) as u32, (y + 4.0 * turn.sin()) as u32, image::Rgb(colour));
+        }
+    }
+    picture.save(path).unwrap();
+}
+
+#[test]
+fn pictures_into_which_corners_were_drawn_are_not_measured() {
+    let folder = workplace();
+    let pictures = copied(folder.path());
+    let names: Vec<String> = (1..=10).map(|name| format!("{name:02}.png")).collect();
+    let drawn = "has the corners drawn into it that a program found";
+    drawn_over(&pictures.join("left").join(&names[2]));
+    let (status, said) = check(folder.path(), &[]);
+    assert!(
+        matches!(status, Some(0 | 1)) && said.contains(&format!("pair 03 is not used: left picture: {drawn}")),
+        "{said}"
+    );
+    for side in ["left", "right"] {
+        names.iter().for_each(|name| drawn_over(&pictures.join(side).join(name)));
+    }
+    for more in [&["--force"][..], &["--force", "--squares", "auto"]] {
+        let (status, said) = check(folder.path(), more);
+        assert!(status == Some(2) && said.contains(drawn) && said.contains("hint: save the pictures"), "{said}");
+    }
+}
+
 /// Corners of a list like corners.csv: pair, side, column, row, place.
 fn corners_of(path: &Path) -> Vec<(String, [f64; 4])> {
     let text = std::fs::read_to_string(path).unwrap();

@@ -8,18 +8,18 @@ use zune_jpeg::zune_core::options::DecoderOptions;
 
 use super::clipping::{self, Value};
 use super::limits::{self, undecodable};
-use super::{Claim, Image, Mosaic, Picture, UNDECODABLE, integrity, mosaic};
+use super::{Claim, Image, Mosaic, Picture, UNDECODABLE, drawn, integrity, mosaic};
 
-/// Decodes the bytes of a file; the reason where that is not possible or the file is cut or damaged. `path` only helps
-/// to tell the format. A grey picture that is a raw colour mosaic needs its pattern.
+/// Decodes the bytes of a file; the reason where that is not possible, the file is cut or damaged, or something was
+/// drawn into the picture. `path` only helps to tell the format. A grey picture that is a raw colour mosaic needs its pattern.
 pub fn decode(bytes: &[u8], path: &Utf8Path, pattern: Option<Mosaic>) -> Result<Picture, String> {
     let decoded = decoded(bytes, path)?;
     let size = (decoded.width() as usize, decoded.height() as usize);
     match decoded {
         _ if !decoded.color().has_color() => mosaic::of_grey(decoded, pattern),
         _ if pattern.is_some() => Err(mosaic::IN_COLOUR.to_owned()),
-        DynamicImage::ImageRgb8(rgb) => Ok(of_colours(&rgb, 3, size).into()),
-        DynamicImage::ImageRgba8(rgb) => Ok(of_colours(&rgb, 4, size).into()),
+        DynamicImage::ImageRgb8(rgb) => drawn::check(&rgb, 3).map(|()| of_colours(&rgb, 3, size).into()),
+        DynamicImage::ImageRgba8(rgb) => drawn::check(&rgb, 4).map(|()| of_colours(&rgb, 4, size).into()),
         DynamicImage::ImageRgb16(rgb) => Ok(of_colours(&rgb, 3, size).into()),
         DynamicImage::ImageRgba16(rgb) => Ok(of_colours(&rgb, 4, size).into()),
         _ => Err(undecodable(FLOATING_POINT)),

@@ -6,6 +6,7 @@
 
 mod clipping;
 mod decode;
+mod drawn;
 mod grey;
 mod integrity;
 mod jpeg_quality;
@@ -17,6 +18,7 @@ pub mod raster;
 
 pub use clipping::Picture;
 pub use decode::{decode, picture};
+pub use drawn::DRAWN;
 pub use grey::{Grey, Grey8, Image};
 pub use jpeg_quality::{ENOUGH_QUALITY, jpeg_quality};
 pub use limits::{Claim, Header, UNDECODABLE, header, read};
