@@ -3,6 +3,7 @@
 pub mod board_shape;
 pub mod camera;
 pub mod known_lenses;
+pub mod nearest_lens;
 pub mod parameters;
 pub mod projection;
 pub mod rectification;

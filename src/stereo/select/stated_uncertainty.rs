@@ -7,11 +7,13 @@
 //! from the chosen model to it is taken as a bias that is known to its own size, and the square of that step is added
 //! (GUM, F.2.4.5). Goes wrong: models that are not among those asked.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
 
+use crate::geometry::Transform;
+use crate::imaging::Side;
 use crate::statistics::chi_square_quantile;
-use crate::stereo::data::Noise;
-use crate::stereo::model::{Layout, Shared, Values};
+use crate::stereo::data::{Noise, in_use};
+use crate::stereo::model::{Layout, Shared, Values, nearest_lens};
 use crate::stereo::select::cross_validation;
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::options::KnownScatter;
@@ -35,7 +37,7 @@ pub struct Witness {
     pub added: usize,
     /// By how much chi-squared falls for them; neighbours, pairs that scatter and print allowed for.
     pub chi_square_fall: f64,
-    /// From the chosen model's shared numbers to its.
+    /// From the chosen model's shared numbers to those by which the chosen model describes its rig.
     step: DVector<f64>,
 }
 
@@ -134,7 +136,7 @@ fn witnesses(problem: &Problem, layout: &Layout, richer: Vec<Layout>, factor: f6
         let trial = Trial::new(problem, richer)?;
         let added = richer.count().checked_sub(layout.count())?;
         let chi_square_fall = (chosen.chi_square - trial.chi_square) / factor;
-        let step = step(layout, &chosen.values.shared, &trial.values.shared);
+        let step = step_to_witness(layout, &chosen.values.shared, &trial.values.shared, problem);
         let witness = Witness { layout: richer, rig: trial.values.shared.rig, added, chi_square_fall, step };
         (chi_square_fall > chi_square_quantile(added as f64, MORE_THAN_CHANCE)).then_some(witness)
     };
@@ -153,6 +155,29 @@ fn richer(layout: &Layout, scores: &[LensScore], lenses_known: bool) -> Vec<Layo
     let lenses = Lens::LADDER.into_iter().filter(|lens| !lenses_known && *lens > own && asked(*lens));
     let lenses = lenses.map(|lens| Layout { left: Some(lens), right: Some(lens), ..*layout });
     lenses.chain((!layout.shape).then_some(Layout { shape: true, ..*layout })).collect()
+}
+
+/// From the chosen model's shared numbers to those by which it describes a richer one's rig. Only a lens with rational
+/// terms beside one without needs to be described: the numbers of the others mean the same in both.
+fn step_to_witness(layout: &Layout, chosen: &Shared, richer: &Shared, problem: &Problem) -> DVector<f64> {
+    let describe = |side: Side| {
+        let (camera, like) = (richer.rig.camera(side), chosen.rig.camera(side));
+        let places = in_use(&problem.views).filter(|o| o.side == side).map(|o| o.px);
+        let is_other = camera.lens >= Lens::Rational8 && like.lens < Lens::Rational8;
+        if is_other { nearest_lens::describe(camera, like, places) } else { None }
+    };
+    let (Some(left), Some(right)) = (describe(Side::Left), describe(Side::Right)) else {
+        return step(layout, chosen, richer);
+    };
+    let mut described = richer.clone();
+    let turned = |turn: UnitQuaternion<f64>| Transform::from_parts(Translation3::identity(), turn);
+    described.rig.right_from_left =
+        turned(right.own_from_camera) * richer.rig.right_from_left * turned(left.own_from_camera.inverse());
+    let mut step = step(layout, chosen, &described);
+    for (side, camera) in [(Side::Left, left), (Side::Right, right)] {
+        step.rows_mut(layout.camera_start(side), camera.step.len()).copy_from(&camera.step);
+    }
+    step
 }
 
 /// From one model's shared numbers to those of a richer one, in the coordinates of the covariance.
