@@ -54,7 +54,7 @@ impl Robot {
     /// rows that miss by several times as much do not help to place it.
     pub fn left_mm(&self, joints_rad: &[Vec<f64>], points_mm: &[Point3<f64>]) -> Option<f64> {
         let rows = self.rows(joints_rad, points_mm, 1);
-        let start = (placed(&rows, &self.tool_mm), self.tool_mm);
+        let start = (placed(&close(&rows)?, &self.tool_mm), self.tool_mm);
         let (frame, tool) = without_gross(&rows, start, |near, _, tool| (placed(near, &tool), tool));
         Some(middle(&rows, &frame, &tool)).filter(|left| left.is_finite())
     }
@@ -90,7 +90,8 @@ impl Robot {
 /// See [`Robot::fit_tool`].
 fn fit(all: &[Row], tool_mm: Vector3<f64>, from: Start) -> Option<ToolFit> {
     let spread_mm = middle_spread(&all.iter().map(|row| row.point).collect::<Vec<_>>())?;
-    let of_start = |tool| without_gross(all, descended(all, placed(all, &tool), tool), descended);
+    let close = close(all)?;
+    let of_start = |tool| without_gross(all, descended(&close, placed(&close, &tool), tool), descended);
     let left = |(frame, tool): &(Transform, Vector3<f64>)| middle(all, frame, tool);
     let mut best = of_start(tool_mm);
     if from == Start::Around && left(&best) > SETTLED * spread_mm {
@@ -112,10 +113,26 @@ pub enum Start {
     Around,
 }
 
+/// The rows to begin with: without points that lie many times as far from the middle as half of the points do. A
+/// reading that failed at zero, far from a wrist that turned a little, would decide the placement of all others.
+fn close(rows: &[Row]) -> Option<Vec<Row>> {
+    /// Points that are spread like a line, a disc or a ball lie within two to four times.
+    const FAR: f64 = 10.0;
+    let points: Vec<Vector3<f64>> = rows.iter().map(|row| row.point).collect();
+    let (centre, spread_mm) = (middle_of(&points)?, middle_spread(&points)?);
+    let is_close = |row: &&Row| (row.point - centre).norm() <= FAR * spread_mm;
+    let close: Vec<Row> = rows.iter().filter(is_close).copied().collect();
+    Some(if close.len() < ENOUGH { rows.to_vec() } else { close })
+}
+
+fn middle_of(points: &[Vector3<f64>]) -> Option<Vector3<f64>> {
+    let [x, y, z] = [0, 1, 2].map(|axis| median(points.iter().map(|p| p[axis])));
+    Some(Vector3::new(x?, y?, z?))
+}
+
 /// Middle distance of points from their middle, mm: angles that jump by a turn spread no farther than the others.
 pub fn middle_spread(points: &[Vector3<f64>]) -> Option<f64> {
-    let [x, y, z] = [0, 1, 2].map(|axis| median(points.iter().map(|p| p[axis])));
-    let centre = Vector3::new(x?, y?, z?);
+    let centre = middle_of(points)?;
     median(points.iter().map(|p| (p - centre).norm()))
 }
 
@@ -256,7 +273,10 @@ mod tests {
     fn a_tool_about_which_the_wrist_turns_is_found() {
         let turns = |i: usize| vec![0.3, -0.2, 0.4, 0.1, (0.7 * i as f64).sin() * 0.8, 0.4 * i as f64 - 2.0];
         let joints: Vec<Vec<f64>> = (0..12).map(turns).collect();
-        let points = seen(Vector3::new(24.0, -10.0, 55.0), &joints);
+        let mut points = seen(Vector3::new(24.0, -10.0, 55.0), &joints);
+        assert!(Robot::paper().fit_tool(&joints, &points, Start::Around).unwrap().left_mm < 1e-2);
+        // A row that was left at zero, metres away.
+        points[0] = Point3::origin();
         assert!(Robot::paper().fit_tool(&joints, &points, Start::Around).unwrap().left_mm < 1e-2);
     }
 }

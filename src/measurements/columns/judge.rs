@@ -14,7 +14,7 @@ use nalgebra::{Point3, Vector3};
 use super::layout::point;
 use super::part::{At, Part};
 use super::pick::{self, Picked};
-use crate::robot::tool_fit::{Start, middle_spread};
+use crate::robot::tool_fit::{Start, ToolFit, middle_spread};
 use crate::robot::{Joint, Robot};
 use crate::tables::names::{Unit, What};
 
@@ -67,16 +67,32 @@ impl Way {
     /// With what the nominal robot leaves of these columns in these units; of rows that name their placement or their
     /// target those of the one that has most.
     fn judged(mut self, parts: &[Part], robot: &Robot) -> Way {
-        let rows = most_alike(parts, &self.picked);
-        let some: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect();
-        if let Some((left, left_mm)) = self.left_of(parts, robot, &some) {
+        if let Some((left, left_mm)) = self.left_of(parts, robot, &some(parts, &self.picked)) {
             (self.left, self.left_mm) = (Some(left), left_mm);
         }
         self
     }
 
-    /// The same of these rows, as a share of the spread of the points and in mm.
+    /// The same with a tool that may be anywhere.
+    fn judged_with_any_tool(mut self, parts: &[Part], robot: &Robot) -> Way {
+        let fit = self.fit(parts, robot, &some(parts, &self.picked), Start::Around);
+        if let Some((fit, _)) = fit.filter(|(fit, _)| fit.spread_mm > 0.0) {
+            (self.left, self.left_mm) = (Some(fit.left_mm / fit.spread_mm), fit.left_mm);
+        }
+        self
+    }
+
+    /// What is left of these rows, as a share of the spread of the points and in mm.
     pub(in crate::measurements) fn left_of(&self, parts: &[Part], robot: &Robot, rows: &[usize]) -> Option<(f64, f64)> {
+        let from = if self.picked.is_sure(parts) { Start::Around } else { Start::File };
+        let (fit, predicted) = self.fit(parts, robot, rows, from)?;
+        // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
+        let least = middle_spread(&predicted)?.min(fit.spread_mm);
+        (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
+    }
+
+    /// The nominal robot with the tool that these rows ask for, and where it has its target with that of its file.
+    fn fit(&self, parts: &[Part], robot: &Robot, rows: &[usize], from: Start) -> Option<(ToolFit, Vec<Vector3<f64>>)> {
         let Way { picked, joints, lengths, .. } = self;
         let (_, at) = picked.points.first()?;
         let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
@@ -92,12 +108,8 @@ impl Way {
                 points.push(point.map(|v| lengths.converted(v)));
             }
         }
-        let from = if picked.is_sure(parts) { Start::Around } else { Start::File };
         let fit = robot.fit_tool(&readings, &points, from).filter(|_| readings.len() >= FEWEST)?;
-        let predicted: Vec<Vector3<f64>> = readings.iter().map(|q| robot.target_mm(q).coords).collect();
-        // Tiny motions under a tool that all but cancels them would come near to points that are small by a wrong unit.
-        let least = middle_spread(&predicted)?.min(fit.spread_mm);
-        (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
+        Some((fit, readings.iter().map(|q| robot.target_mm(q).coords).collect()))
     }
 
     /// Whether the points are the nominal robot's own.
@@ -170,7 +182,9 @@ pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], rob
     let unknown = |at: &At| parts[at.part].spare().contains(&at.column);
     let guessed = |p: &Picked| p.columns().any(|at| unknown(&at));
     let free = |at: &At| !parts[at.part].is_named() || unknown(at);
-    let points_alone = |picked: &Picked| points_that_fit(parts, picked, robot, forced, &free);
+    let given = candidates;
+    let in_units = |picked: &Picked| in_all_units(parts, std::slice::from_ref(picked), robot, forced);
+    let points_alone = |picked: &Picked| points_that_fit(picked, &in_units, &free);
     let candidates: &[Picked] = &candidates.iter().map(points_alone).collect::<Vec<_>>();
     let ways = in_all_units(parts, candidates, robot, forced);
     let Some(best) = ways.first().cloned() else { return Verdict::None };
@@ -217,27 +231,42 @@ pub(in crate::measurements) fn decide(parts: &[Part], candidates: &[Picked], rob
         }
     }
     if !only {
-        return Verdict::None;
+        let of_wrist = with_any_tool(parts, given, robot, forced, &free);
+        return of_wrist.map_or(Verdict::None, |ways| by_sizes(parts, &ways[0].picked, forced, &ways));
     }
     by_sizes(parts, &candidates[0], forced, &ways)
 }
 
-/// The same without those of several guessed targets that the robot does not carry: three angles beside a point keep
-/// about one distance from it, too.
-fn points_that_fit(
+/// All ways to read the only columns that are near with a tool that may be anywhere. Where the wrist alone moved, the
+/// place of the file's tool says nothing of the real one's, and points that are small by another unit come as near with
+/// a tool that is small as well, so that units are not told.
+fn with_any_tool(
     parts: &[Part],
-    picked: &Picked,
+    candidates: &[Picked],
     robot: &Robot,
     forced: Forced,
     unknown: &dyn Fn(&At) -> bool,
-) -> Picked {
+) -> Option<Vec<Way>> {
+    let ways = |picked: &Picked| {
+        let all = usual(std::slice::from_ref(picked), forced).into_iter();
+        all.map(|way| way.judged_with_any_tool(parts, robot)).collect::<Vec<Way>>()
+    };
+    let is_near = |ways: &Vec<Way>| ways.iter().any(|way| way.left.is_some_and(|left| left < NEAR));
+    let alone = |picked: &Picked| ways(&points_that_fit(picked, &ways, unknown));
+    let mut near = candidates.iter().map(alone).filter(is_near);
+    let first = near.next()?;
+    near.next().is_none().then_some(first)
+}
+
+/// The same without those of several guessed targets that the robot does not carry: three angles beside a point keep
+/// about one distance from it, too.
+fn points_that_fit(picked: &Picked, ways: &dyn Fn(&Picked) -> Vec<Way>, unknown: &dyn Fn(&At) -> bool) -> Picked {
     if picked.points.len() < 2 || !picked.points.iter().flat_map(|(_, at)| at).any(unknown) {
         return picked.clone();
     }
     let fits = |target: &&(String, [At; 3])| {
         let alone = Picked { points: vec![(*target).clone()], ..picked.clone() };
-        let ways = in_all_units(parts, &[alone], robot, forced);
-        ways.first().and_then(|way| way.left).is_some_and(|left| left < NEAR)
+        ways(&alone).iter().any(|way| way.left.is_some_and(|left| left < NEAR))
     };
     let mut points: Vec<(String, [At; 3])> = picked.points.iter().filter(fits).cloned().collect();
     match &mut points[..] {
@@ -308,6 +337,12 @@ fn by_sizes(parts: &[Part], picked: &Picked, forced: Forced, ways: &[Way]) -> Ve
         }
         (joints, lengths) => Verdict::NoUnit { joints, lengths },
     }
+}
+
+/// Some of the rows that are judged, spread over all.
+fn some(parts: &[Part], picked: &Picked) -> Vec<usize> {
+    let rows = most_alike(parts, picked);
+    rows.iter().copied().step_by(rows.len().div_ceil(ROWS).max(1)).collect()
 }
 
 /// The rows of the placement and the target, where names say them, that have most rows.

@@ -199,6 +199,37 @@ fn what_a_tool_alone_explains_was_computed() {
     assert!(!said.contains("computed"), "{said}");
 }
 
+/// Sweeps of the last two joints, as a tool is measured.
+fn of_wrist(robot: &Robot, noise_mm: f64) -> Rows {
+    let sensor = transform(Vector3::new(0.4, 2.0, -0.7), Vector3::new(1900.0, -2000.0, 300.0));
+    let row = |i: usize| {
+        let (fifth, sixth) = if i < 25 { (5.0 * i as f64 - 60.0, 90.0) } else { (0.0, 5.0 * i as f64 - 200.0) };
+        let joints = vec![20.0, -70.0, 60.0, 15.0, fifth, sixth];
+        let radians: Vec<f64> = joints.iter().map(|q| q.to_radians()).collect();
+        let point = sensor * robot.target_mm(&radians);
+        (joints, [0, 1, 2].map(|k| point[k] + noise_mm * 1.4 * ((17 * i + 5 * k) as f64).sin()))
+    };
+    (0..60).map(row).collect()
+}
+
+/// The file's tool, which stands on the last axis, says nothing of the points' spread, and what is off in the rest of
+/// the arm moves all points alike.
+#[test]
+fn a_table_of_the_wrist_alone_is_read_and_was_measured() {
+    let folder = Folder(workplace());
+    let robot = catalogue::robot("ur5e").expect("it is known");
+    let rows = of_wrist(&Robot { tool_mm: Vector3::new(24.0, -10.0, 55.0), ..robot.clone() }, 0.01);
+    let behind = |rows: &Rows| text("", rows, ",", |q, p| [q, p, &[0.0; 3]].concat());
+    let (found, said) = source(&[&folder.file("wrist.csv", behind(&rows))]).read(&robot).expect("it is read");
+    same(&found, &rows, "wrist");
+    assert!(said[0].contains("points from columns 7 to 9 in mm (by their size"), "{said:?}");
+    let (said, _) = verdict("ur5e", &rows);
+    assert!(!said.contains("computed"), "{said}");
+    // Points that do not follow the joints are refused as before.
+    let mixed: Rows = rows.iter().enumerate().map(|(i, (q, _))| (q.clone(), rows[(7 * i + 11) % 60].1)).collect();
+    refused(&source(&[&folder.file("mixed.csv", behind(&mixed))]), &robot, &["no choice of them comes near"]);
+}
+
 #[test]
 fn a_scale_that_is_seen_is_a_doubt() {
     let (said, _) = verdict("ur5e", &of_arm(&built(|_| {}), 60, 0.03, 1.01));
