@@ -109,7 +109,14 @@ pub(super) fn of_yaml(text: &str, path: &Utf8Path) -> Option<String> {
     }
     let is_comment =
         |line: &&str| line.trim().is_empty() || line.trim_start().starts_with(['#', '%']) || line.starts_with("---");
-    let lines: Vec<&str> = text.lines().filter(|line| !is_comment(line)).collect();
+    // A list that is too long for a line goes on in the next one.
+    let mut open = 0;
+    let mut begins = |line: &&str| {
+        let goes_on = open > 0;
+        open += line.matches('[').count() as i64 - line.matches(']').count() as i64;
+        !goes_on
+    };
+    let lines: Vec<&str> = text.lines().filter(|line| !is_comment(line) && begins(line)).collect();
     let item = |line: &str| line.trim_start().strip_prefix("- ").is_some_and(|rest| !rest.contains([',', '[']));
     let of_yaml = lines.iter().filter(|line| behind_key(line).is_some() || item(line)).count();
     let nested = lines.iter().any(|line| behind_key(line).is_some_and(|rest| rest.trim().is_empty()));
@@ -119,10 +126,15 @@ pub(super) fn of_yaml(text: &str, path: &Utf8Path) -> Option<String> {
     let loaded = format!("yaml.safe_load(open('{file}'))");
     let records = match (lines.first().is_some_and(|first| first.starts_with('-')), keys_to_list(&lines)) {
         (true, _) => loaded,
-        (_, Some(keys)) => format!("{loaded}['{}']", keys.join("']['")),
+        (_, Some(keys)) => loaded + &keys.iter().map(|key| in_brackets(key)).collect::<String>(),
         _ => format!("list({loaded}.values())"),
     };
     Some(in_python("yaml", &format!("json_normalize({records})"), path))
+}
+
+/// A key as Python looks it up; one that is a number is loaded as a number.
+fn in_brackets(key: &str) -> String {
+    if key.parse::<f64>().is_ok() { format!("[{key}]") } else { format!("['{key}']") }
 }
 
 /// The keys that lead to the first list of records.
@@ -192,6 +204,18 @@ mod tests {
         let opencv = format!("%YAML:1.0\n---\ncount: 2\n{}{}", matrix(0), matrix(1));
         let said = of_yaml(&opencv, Utf8Path::new("pairs.yml")).unwrap();
         assert!(said.contains("getNode('T_%d' % i)") && said.contains("range(2)"), "{said}");
+        // Lists over two lines, as PyYAML writes them, below keys of several levels.
+        let station = |i: usize| {
+            format!(
+                "    - id: {i}\n      joints: [1.5, 2.5, 3.5,\n        4.5, 5.5, 6.5]\n      point: [1.0, 2.0, 3.0]\n"
+            )
+        };
+        let wrapped = format!(
+            "names: [a, b,\n  c]\nheights:\n  1.98:\n    stations:\n{}",
+            (0..9).map(station).collect::<String>()
+        );
+        let said = of_yaml(&wrapped, Utf8Path::new("flat.yaml")).unwrap();
+        assert!(said.contains("open('flat.yaml'))['heights'][1.98]['stations'])"), "{said}");
         assert_eq!(of_yaml("a,b,c\n1,2,3\n4,5,6\n", Utf8Path::new("a.csv")), None);
         assert_eq!(of_yaml("- [1, 2, 3]\n- [4, 5, 6]\n", Utf8Path::new("a.yaml")), None);
     }
