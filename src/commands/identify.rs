@@ -35,7 +35,7 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
     let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
     let rows = read(&source, &given)?;
     let mut set = Dataset::of_robot(&rows, &given)?;
-    still::check_points(&set)?;
+    still::check_points(&set, Some(&given))?;
     set.files = files(&source, &rows);
     set.typed_unit = source.typed_length();
     if let Some(path) = &args.known_distances {

@@ -49,7 +49,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
     out.check_free(&[PLACEMENT])?;
 
     let set = Dataset::new(&rows)?;
-    still::check_points(&set)?;
+    still::check_points(&set, Some(&robot))?;
     let Examined { set, robot: of_rows, along, findings, mended, against, unexplained } =
         examine::examine(&set, &robot, &config.identify, &|_| {});
     // The robot is that of its file: what is wrong between the two is mended in the rows.

@@ -17,8 +17,15 @@ pub enum Error {
         reason: Option<String>,
     },
     /// Points that do not move with the robot.
-    #[error("all {rows} points are one, {:.3}, {:.3}, {:.3} mm, although the joints moved: nothing was measured", point_mm[0], point_mm[1], point_mm[2])]
-    OnePoint { rows: usize, point_mm: [f64; 3] },
+    #[error("all {rows} points are one, {:.3}, {:.3}, {:.3} mm{}", point_mm[0], point_mm[1], point_mm[2], of_one(*.way_mm, *.of_robot_mm))]
+    OnePoint {
+        rows: usize,
+        point_mm: [f64; 3],
+        /// How far they are from their middle, mm, in the middle of them.
+        way_mm: f64,
+        /// The same of the robot's target.
+        of_robot_mm: f64,
+    },
     /// Robot and measurements are not about the same machine.
     #[error("the robot has {robot} joints, the measurements have {measurements}{}", missing.as_ref().map_or_else(String::new, |column| format!("; there is no column `{column}`")))]
     JointCount {
@@ -117,6 +124,16 @@ pub enum Error {
     /// A solver started from numbers that are no numbers.
     #[error("the residuals at the nominal robot are not finite")]
     NotFinite,
+}
+
+/// What points say that are one although the joints moved.
+fn of_one(way_mm: f64, of_robot_mm: f64) -> String {
+    if way_mm == 0.0 {
+        return ", although the joints moved: nothing was measured".to_owned();
+    }
+    format!(
+        " to {way_mm:.4} mm, where the robot moves its target by {of_robot_mm:.0} mm: what was measured stands still (the base, a reference)"
+    )
 }
 
 impl Explain for Error {

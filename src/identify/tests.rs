@@ -261,7 +261,7 @@ fn a_smooth_error_of_each_placement_is_found_and_makes_the_result_less_certain()
         let formulation = found.formulation().unwrap();
         let findings = findings(&set, &found, &Default::default());
         let said = findings.iter().any(|f| f.finding.contains("smooth error"));
-        let of_robot_mm = Expected::new(formulation, &set, &found.fitted).of_robot_mm;
+        let of_robot_mm = Expected::new(formulation, &set, &found.fitted, &[]).of_robot_mm;
         (said, formulation.rows.left_by_smooth_mm2().sqrt(), of_robot_mm)
     };
     let (alarm, _, clean_mm) = told(0.0);

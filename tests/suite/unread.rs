@@ -84,6 +84,39 @@ fn rows_that_were_fitted_do_not_verify() {
     assert!(!said.contains("copies of fitted rows"), "{said}");
 }
 
+/// A row that a program left at zero tells nothing of where the robot is known.
+#[test]
+fn a_row_of_zeros_changes_no_promise() {
+    let folder = workplace();
+    let rows = world(folder.path());
+    let promise = |rows: &[Vec<String>]| {
+        let (_, said) = identified(folder.path(), rows);
+        let line = said.lines().find(|line| line.starts_with("expected position error")).unwrap_or_default();
+        (line.to_owned(), said)
+    };
+    let mut with_zeros = rows.clone();
+    let mut zeros = rows[1].clone();
+    zeros[0] = "zeros".to_owned();
+    zeros[J1..X + 3].fill("0".to_owned());
+    with_zeros.insert(1, zeros);
+    let ((clean, _), (told, said)) = (promise(&rows), promise(&with_zeros));
+    assert!(said.contains("1 row fits far worse than the rest: zeros"), "{said}");
+    assert_eq!(told, clean, "{said}");
+}
+
+#[test]
+fn points_of_something_that_stands_still_are_refused() {
+    let folder = workplace();
+    let mut rows = world(folder.path());
+    for (i, row) in rows.iter_mut().enumerate().skip(1) {
+        for (k, cell) in row[X..X + 3].iter_mut().enumerate() {
+            *cell = (700.0 + 0.02 * ((7 * i + k) as f64).sin()).to_string();
+        }
+    }
+    let (status, said) = identified(folder.path(), &rows);
+    assert!(status == Some(2) && said.contains("what was measured stands still"), "{said}");
+}
+
 #[test]
 fn rows_without_a_group_are_refused_and_a_mean_below_is_left_out() {
     let folder = workplace();

@@ -182,7 +182,7 @@ fn of_rows(args: &Verify, rows: &[Measurement], first: Option<&Robot>) -> Result
         (None, Some(robot)) => Dataset::of_robot(rows, robot)?,
         (None, None) => Dataset::new(rows)?,
     };
-    still::check_points(&set)?;
+    still::check_points(&set, first)?;
     if let Some(path) = &args.known_distances {
         set.known = distances::read(path, &set)?;
     }

@@ -164,7 +164,7 @@ fn compared(
 /// The rows in the units, signs and columns that the robot has, and what was mended. Rows that it was identified from
 /// are not known again in others.
 fn mended(set: Dataset, robot: &Robot, p95_mm: f64, config: &Config) -> Result<(Dataset, Option<String>)> {
-    still::check_points(&set)?;
+    still::check_points(&set, Some(robot))?;
     Ok(match on_rows::of_known(&set, robot, p95_mm, &config.identify) {
         Some(OfKnown { set, finding }) => (
             set,

@@ -5,9 +5,10 @@ use std::collections::BTreeSet;
 
 use nalgebra::Point3;
 
-use super::dataset::Dataset;
+use super::dataset::{Dataset, Pose};
 use crate::identify::Error;
 use crate::robot::Robot;
+use crate::robot::tool_fit::middle_spread;
 
 /// Joints within this, rad or mm, are the same.
 const SAME_JOINT: f64 = 1e-9;
@@ -15,15 +16,32 @@ const SAME_JOINT: f64 = 1e-9;
 /// Points within this of each other, mm, are one: no instrument reads twice the same so closely.
 const SAME_POINT_MM: f64 = 1e-9;
 
-/// Refuses points of which all are one although the robot moved: nothing was measured.
-pub fn check_points(set: &Dataset) -> Result<(), Error> {
+/// Share of the way of the robot's target that points must go at least: a fifth of it where they are in metres and are
+/// taken for mm.
+const LEAST_WAY: f64 = 2e-4;
+
+/// Refuses points of which all are one although the robot moved: nothing was measured, or something that stands still.
+pub fn check_points(set: &Dataset, robot: Option<&Robot>) -> Result<(), Error> {
     let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
-    let is_one = points.len() > 1 && points.iter().all(|point| (point - points[0]).norm() <= SAME_POINT_MM);
     let moved = set.poses.iter().any(|pose| pose.joints_rad != set.poses[0].joints_rad);
-    match is_one && moved {
-        true => Err(Error::OnePoint { rows: points.len(), point_mm: points[0].coords.into() }),
+    if points.len() < 2 || !moved {
+        return Ok(());
+    }
+    let of_robot_mm = robot.map_or(0.0, |robot| way_mm(set, |pose| Some(robot.target_mm(&pose.joints_rad))));
+    let way_mm = way_mm(set, |pose| pose.reading.point_mm());
+    match way_mm <= SAME_POINT_MM.max(LEAST_WAY * of_robot_mm) {
+        true => Err(Error::OnePoint { rows: points.len(), point_mm: points[0].coords.into(), way_mm, of_robot_mm }),
         false => Ok(()),
     }
+}
+
+/// Middle distance of points from their middle, mm, in the group where it is largest.
+fn way_mm(set: &Dataset, point: impl Fn(&Pose) -> Option<Point3<f64>>) -> f64 {
+    let of_group = |group: usize| {
+        let of_rows = set.rows(|pose| pose.group == group).into_iter();
+        middle_spread(&of_rows.filter_map(|row| Some(point(&set.poses[row])?.coords)).collect::<Vec<_>>())
+    };
+    (0..set.groups.len()).filter_map(of_group).fold(0.0, f64::max)
 }
 
 /// Rows of the same group at the same joints.
@@ -49,16 +67,21 @@ pub const STILL: f64 = 0.02;
 
 /// From its least to its largest reading, rad or mm.
 pub fn way(set: &Dataset, joint: usize) -> f64 {
+    way_in(set.poses.iter(), joint)
+}
+
+/// The same in some poses.
+pub fn way_in<'a>(poses: impl Iterator<Item = &'a Pose>, joint: usize) -> f64 {
     let ends = |(low, high): (f64, f64), q: f64| (low.min(q), high.max(q));
-    let (low, high) =
-        set.poses.iter().map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
+    let (low, high) = poses.map(|pose| pose.joints_rad[joint]).fold((f64::INFINITY, f64::NEG_INFINITY), ends);
     high - low
 }
 
-/// Joints that do not move, by their numbers from 1.
-pub fn constant_joints(set: &Dataset) -> Vec<String> {
+/// Joints that do not move, by their numbers from 1; rows that were left out tell nothing.
+pub fn constant_joints(set: &Dataset, left_out: &[usize]) -> Vec<String> {
+    let poses = || set.poses.iter().enumerate().filter(|(row, _)| !left_out.contains(row)).map(|(_, pose)| pose);
     (0..set.joint_count())
-        .filter(|&j| (0.0..=SAME_JOINT).contains(&way(set, j)))
+        .filter(|&j| (0.0..=SAME_JOINT).contains(&way_in(poses(), j)))
         .map(|joint| (joint + 1).to_string())
         .collect()
 }
@@ -94,6 +117,6 @@ mod tests {
         rows.push(row("d", "2", 30.0));
         let set = Dataset::new(&rows).unwrap();
         assert_eq!(repeated(&set), ["a", "a2"]);
-        assert_eq!(constant_joints(&set), ["1"]);
+        assert_eq!(constant_joints(&set, &[]), ["1"]);
     }
 }

@@ -3,6 +3,7 @@
 pub mod cross_validation;
 pub mod errors;
 pub mod folds;
+pub mod lag;
 pub mod lengths;
 pub mod locate;
 pub mod pattern;

@@ -7,7 +7,7 @@
 
 use std::iter;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::identify::data::dataset::Dataset;
@@ -18,30 +18,64 @@ use crate::linear_algebra::{Eliminated, rank};
 /// Chance that readings that only scatter are said to follow the joints.
 const FALSE_ALARM: f64 = 0.01;
 
+/// What further columns explain of what a fit leaves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Explained {
+    /// Share of the sum of squares beyond what as many columns that mean nothing take.
+    pub share: f64,
+    /// How often columns that mean nothing explain as much.
+    pub chance: f64,
+    /// Their factors, and how well each is known (standard deviation).
+    pub factors: DVector<f64>,
+    pub sds: DVector<f64>,
+}
+
+/// What the first `tested` of these columns of each placement explain, everything else that is fitted and the other
+/// columns at their best. `None` where too little is left to tell: with fewer numbers left than the columns take,
+/// little would be noticed.
+pub fn explained(
+    formulation: &Formulation,
+    tested: usize,
+    columns: impl Fn(&Placement) -> DMatrix<f64>,
+) -> Option<Explained> {
+    let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
+    let all: Vec<DMatrix<f64>> = linear.placements.iter().map(columns).collect();
+    let kept = 1 + all.first()?.ncols() + linear.shared;
+    // Of the residual, the fresh columns and the shared ones, in that order.
+    let mut normal = DMatrix::zeros(kept, kept);
+    let mut left = 0.0;
+    for (placement, columns) in linear.placements.iter().zip(&all) {
+        normal += eliminated(placement, columns, linear.shared);
+        left += placement.poses.len() as f64 - placement.linear.design.ncols() as f64;
+    }
+    let others = kept - 1 - tested;
+    left -= rank(&normal.view((1 + tested, 1 + tested), (others, others)).into_owned()) as f64;
+    let normal = Eliminated::new(&normal, 1 + tested).normal;
+    let own = normal.view((1, 1), (tested, tested)).into_owned();
+    let explaining = rank(&own) as f64;
+    left -= explaining;
+    if explaining < 1.0 || left < explaining {
+        return None;
+    }
+    let Eliminated { normal: of_residual, follow, inverse } = Eliminated::new(&normal, 1);
+    let (whole, unexplained) = (normal[(0, 0)], of_residual[(0, 0)]);
+    let scatter = unexplained / left;
+    let ratio = (whole - unexplained) / explaining / scatter;
+    Some(Explained {
+        share: (whole - unexplained - explaining * scatter) / whole,
+        chance: FisherSnedecor::new(explaining, left).ok()?.sf(ratio),
+        factors: -follow.column(0),
+        sds: inverse.diagonal().map(|variance| (variance * scatter).sqrt()),
+    })
+}
+
 /// Whether enough is left of a fit to tell, and it follows no joint.
 pub fn is_scatter(formulation: &Formulation, set: &Dataset) -> bool {
     let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
     let numbers = linear.placements.iter().flat_map(Placement::by_pose).map(|(_, at)| at.len()).max().unwrap_or(0);
-    let (fresh, shared) = (2 * set.joint_count() * numbers, linear.shared);
-    // Of the residual, the fresh columns and the shared ones, in that order.
-    let mut normal = DMatrix::zeros(1 + fresh + shared, 1 + fresh + shared);
-    let mut left = 0.0;
-    for placement in &linear.placements {
-        let columns = columns(placement, formulation, set, fresh);
-        normal += eliminated(placement, &columns, shared);
-        left += placement.poses.len() as f64 - placement.linear.design.ncols() as f64;
-    }
-    left -= rank(&normal.view((1 + fresh, 1 + fresh), (shared, shared)).into_owned()) as f64;
-    let normal = Eliminated::new(&normal, 1 + fresh).normal;
-    let explaining = rank(&normal.view((1, 1), (fresh, fresh)).into_owned()) as f64;
-    left -= explaining;
-    // With fewer numbers left than the columns take, little would be noticed.
-    if explaining < 1.0 || left < explaining {
-        return false;
-    }
-    let unexplained = Eliminated::new(&normal, 1).normal[(0, 0)];
-    let gain = (normal[(0, 0)] - unexplained) / explaining / (unexplained / left);
-    FisherSnedecor::new(explaining, left).is_ok_and(|law| law.cdf(gain) < 1.0 - FALSE_ALARM)
+    let count = 2 * set.joint_count() * numbers;
+    explained(formulation, count, |placement| columns(placement, formulation, set, count))
+        .is_some_and(|explained| explained.chance > FALSE_ALARM)
 }
 
 /// Sine and cosine of each joint (of one that slides its way and the square of it), for each number of a pose's

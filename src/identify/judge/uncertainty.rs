@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
-use crate::identify::data::dataset::Dataset;
+use crate::identify::data::dataset::{Dataset, Pose};
 use crate::identify::judge::lengths::{Length, Lengths, MEAN_OVER_RMS};
 use crate::identify::model::kinematics::Kinematics;
 use crate::identify::settings::Model;
@@ -73,10 +73,11 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// At poses like those of the set, the placements fitted to `fitted`: at a row that was fitted it is that of a fit
-    /// without it.
-    pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize]) -> Expected {
-        Expected::at(formulation, set, fitted, &(0..set.poses.len()).collect::<Vec<_>>())
+    /// At poses like those of the set but for rows that were `left_out` as gross errors, whose joints may be as wrong as
+    /// their points; the placements fitted to `fitted`: at a row that was fitted it is that of a fit without it.
+    pub fn new(formulation: &Formulation, set: &Dataset, fitted: &[usize], left_out: &[usize]) -> Expected {
+        let rows: Vec<usize> = (0..set.poses.len()).filter(|row| !left_out.contains(row)).collect();
+        Expected::at(formulation, set, fitted, &rows)
     }
 
     /// At some rows of the set.
@@ -117,7 +118,8 @@ impl Expected {
         let of_rows = |all: &[Matrix3<f64>]| rows.iter().map(|&row| all[row]).collect::<Vec<Matrix3<f64>>>();
         let told = formulation.rows.scatter.freedom_of(&of_rows(&of_errors));
         let Lengths { mean_mm, p95_mm, max_mm } = Lengths::new(&of_rows(&of_errors), told);
-        let length = |row: &usize| (set.poses[*row].name.clone(), Length::new(&of_errors[*row], told).mean_mm());
+        let length = |(row, pose): (usize, &Pose)| (pose.name.clone(), Length::new(&of_errors[row], told).mean_mm());
+        let joint_ranges = ranges(set, rows);
         Expected {
             mean_mm,
             p95_mm,
@@ -126,10 +128,10 @@ impl Expected {
             scatter_mm: MEAN_OVER_RMS * (3.0 * (scatter_mm2 + smooth_mm2)).sqrt(),
             stated_mm: stated_mm(set).map(|mm| mm * formulation.rows.scatter.stated.sqrt()),
             freedom: formulation.rows.scatter.freedom,
-            poses: region(set),
-            near_only: near_only(nominal, &ranges(set)),
-            joint_ranges: ranges(set),
-            map: rows.iter().map(length).collect(),
+            poses: said(set, &joint_ranges),
+            near_only: near_only(nominal, &joint_ranges),
+            joint_ranges,
+            map: set.poses.iter().enumerate().map(length).collect(),
         }
     }
 
@@ -217,10 +219,10 @@ pub(super) fn each_row(formulation: &Formulation) -> Vec<(Placement, Predicted)>
     Linearised::new(&rows, &offsets[..count]).placements.into_iter().map(of_placement).collect()
 }
 
-/// From where to where each joint was read, deg (mm where it slides).
-fn ranges(set: &Dataset) -> Vec<[f64; 2]> {
+/// From where to where each joint was read in these rows, deg (mm where it slides).
+fn ranges(set: &Dataset, rows: &[usize]) -> Vec<[f64; 2]> {
     let range = |j: usize| {
-        let values = set.poses.iter().map(|p| p.joints_rad[j]);
+        let values = rows.iter().map(|&row| set.poses[row].joints_rad[j]);
         let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
         if set.is_sliding(j) { [low, high] } else { [low.to_degrees(), high.to_degrees()] }
     };
@@ -250,11 +252,15 @@ fn near_only(nominal: &Robot, ranges: &[[f64; 2]]) -> Vec<String> {
 
 /// The ranges of the joints that were measured, for a person.
 pub fn region(set: &Dataset) -> String {
-    let of_joint = |(j, [low, high]): (usize, [f64; 2])| {
+    said(set, &ranges(set, &set.rows(|_| true)))
+}
+
+fn said(set: &Dataset, ranges: &[[f64; 2]]) -> String {
+    let of_joint = |(j, [low, high]): (usize, &[f64; 2])| {
         let unit = if set.is_sliding(j) { "mm" } else { "deg" };
         format!("j{} {:.0}..{:.0} {unit}", j + 1, low.round() + 0.0, high.round() + 0.0)
     };
-    ranges(set).into_iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")
+    ranges.iter().enumerate().map(of_joint).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::parameters::MethodRecord;
 use super::quality::PointSpread;
 use super::{rounded, untested};
 use crate::identify::data::dataset::{Dataset, Kind};
-use crate::identify::data::unused;
+use crate::identify::data::{still, unused};
 use crate::identify::examine::conventions;
 use crate::identify::examine::in_hand::most_points;
 use crate::identify::finding::Finding;
@@ -64,7 +64,7 @@ impl Record {
         doubts.extend(self.implausible(set, nominal));
         // What speaks against the result is why its figures are odd, whatever the number of rows.
         doubts.extend(self.promise(set, nominal).filter(|_| findings.against.is_empty() && far.is_none()));
-        doubts.extend(untested::still(set));
+        doubts.extend(untested::still(set, &found.outliers));
         doubts.extend(untested::one_orientation(set, nominal, found));
         doubts.extend(self.at_limit(found));
         let against = findings.against.first().or(far.as_ref()).map(|finding| finding.finding.clone());
@@ -152,9 +152,13 @@ impl Record {
         ))
     }
 
-    /// Points that the nominal robot, its tool solved, predicts better than arms come back to them.
+    /// Points that the nominal robot, its tool solved, predicts better than arms come back to them. Where the wrist alone
+    /// moved it does so of an arm as it is built, too: what is off in the rest of it moves all points alike.
     fn predicted(&self, set: &Dataset, nominal: &Robot) -> Option<String> {
-        let of_points = self.with_tool_mm(set, nominal).filter(|_| set.kind == Kind::Positions);
+        /// Joints of a wrist.
+        const OF_WRIST: usize = 3;
+        let moved = (0..set.joint_count()).filter(|&joint| still::way(set, joint) > still::STILL).count();
+        let of_points = self.with_tool_mm(set, nominal).filter(|_| set.kind == Kind::Positions && moved > OF_WRIST);
         let left_mm = of_points.filter(|left| *left < REPEATABILITY_MM)?;
         Some(format!(
             "with the right tool the nominal robot is off by {left_mm:.4} mm in the middle of the rows, less than arms repeat to: these points \

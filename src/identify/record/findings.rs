@@ -10,9 +10,9 @@ use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::Judge;
-use crate::identify::judge::pattern;
 use crate::identify::judge::scale::CommonScale;
 use crate::identify::judge::uncertainty::stated_mm;
+use crate::identify::judge::{lag, pattern};
 use crate::identify::record::file::Smooth;
 use crate::identify::record::{left_out, misfits, plausible, rounded, untested};
 use crate::identify::run::Identification;
@@ -87,12 +87,14 @@ impl Findings {
             .or_else(|| plausible::of_all_lengths(found))
             .filter(|_| against.is_empty());
         let terms = plausible::of_terms(found);
+        let lagging = found.formulation().and_then(|formulation| lag::find(set, formulation));
         let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined
             .into_iter()
             .chain(along.instead.clone())
             .chain(rounded)
             .chain(many)
+            .chain(lagging)
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
@@ -241,7 +243,7 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
         let finding = "poses that the robot came back to: they say how well it repeats, and nothing about its links";
         add(finding.to_owned(), names, "all of them are used");
     }
-    let constant = match &constant_joints(set)[..] {
+    let constant = match &constant_joints(set, &found.outliers)[..] {
         [] => None,
         [one] => {
             Some(format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'"))

@@ -74,7 +74,7 @@ impl Record {
             covariance: formulation.map(|f| Covariance::new(f, &f.robot_covariance())),
             whole_covariance: formulation.map(|f| Covariance::new(f, &f.whole_covariance())),
             variance_along: formulation.map_or_else(Vec::new, variances_along).into_iter().collect(),
-            expected: formulation.map(|f| Expected::new(f, set, &found.fitted)),
+            expected: formulation.map(|f| Expected::new(f, set, &found.fitted, &found.outliers)),
             scale: found.scale(set),
             targets: set.targets.clone().map(|targets| targets.solved(&found.extras)),
             repeats: set.repeats.clone(),

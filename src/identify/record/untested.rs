@@ -70,8 +70,8 @@ pub fn joints(set: &Dataset, found: &Identification) -> (Vec<Finding>, Vec<Findi
 }
 
 /// Several joints that did not move.
-pub fn still(set: &Dataset) -> Option<String> {
-    let joints = constant_joints(set);
+pub fn still(set: &Dataset, left_out: &[usize]) -> Option<String> {
+    let joints = constant_joints(set, left_out);
     (joints.len() > 1).then(|| {
         format!(
             "joints {} did not move: the identified robot is right for these readings of theirs only; move every joint between poses",

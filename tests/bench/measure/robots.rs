@@ -86,7 +86,7 @@ fn outcome(target_um: f64, seed: u64) -> Outcome {
         let off = |k: usize| (formulation.free_fit.x[k] - of_exact.free_fit.x[k]) / covariance[(k, k)].sqrt();
         (0..formulation.base.rank()).map(off).collect()
     });
-    let promised = Expected::new(formulation, &set, &found.fitted).of_robot_mm;
+    let promised = Expected::new(formulation, &set, &found.fitted, &found.outliers).of_robot_mm;
     Outcome { promise_mm: [promised, against_truth(&set, &found, &candidate.robot, &world.arm.truth)], parameters }
 }
 

@@ -40,7 +40,7 @@ fn cell(oriented: bool, seed: u64) -> Cell {
     let identified = identify(&set, &world.nominal, &settings, 1, &|_| {}).unwrap();
     let formulation = identified.formulation().unwrap();
     let scatter = formulation.rows.scatter;
-    let expected = Expected::new(formulation, &set, &identified.fitted);
+    let expected = Expected::new(formulation, &set, &identified.fitted, &[]);
     let before = Before {
         correction: Vec::new(),
         over: expected.joint_ranges.iter().map(|range| (range[0].to_radians(), range[1].to_radians())).collect(),

@@ -54,7 +54,7 @@ fn what_is_promised_says_whether_the_instruments_noise_is_in_it() {
         let mut world = synthetic::planned(240, 60, 25.0, 0.1, 3, &|_| {});
         synthetic::state(&mut world.rows, |_| stated.then(|| Matrix3::from_diagonal_element(0.1 * 0.1)));
         let (set, found) = world.identified(&world.rows);
-        let expected = Expected::new(found.formulation().unwrap(), &set, &found.fitted);
+        let expected = Expected::new(found.formulation().unwrap(), &set, &found.fitted, &[]);
         let said = expected.parts();
         let errors = Judge::plain(&set, &found.fitted, false).errors(found.robot(), &set.verify_rows());
         let errors_mm: Vec<f64> = errors.iter().filter_map(|error| Some(error.point_mm?.norm())).collect();
