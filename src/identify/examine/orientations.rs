@@ -14,6 +14,7 @@ use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use crate::geometry::nearest_rotation;
 use crate::identify::data::dataset::{Dataset, Pose, Reading};
+use crate::identify::data::still;
 use crate::identify::finding::Finding;
 use crate::robot::Robot;
 use crate::statistics::median;
@@ -27,6 +28,9 @@ const EXPLAINS: f64 = 4.0;
 /// Median of the length of a vector whose three components are normal, over that of the size of one of them: what noise
 /// alone makes of turns about axes beside the turns' sizes.
 const OF_NOISE: f64 = 1.538 / 0.6745;
+
+/// Share of a joint's way that rows must go, or others alone show the joint.
+const LEAST_WAY: f64 = 0.1;
 
 /// Pairs of poses that are enough to tell, and poses of a placement that tell by themselves.
 const PAIRS: usize = 200;
@@ -187,7 +191,13 @@ fn without_turned(set: Dataset, robot: &Robot, usual_rad: f64) -> (Dataset, Opti
         median(others.filter_map(difference)).is_some_and(|off| off > usual_rad.max(IMPLAUSIBLE_RAD))
     };
     let turned: Vec<usize> = (0..set.poses.len()).filter(is_turned).collect();
-    if turned.is_empty() {
+    // Rows that alone move a joint are turned by how that joint is counted, which the fit has to tell.
+    let moves_alone = |joint: usize| {
+        let others = set.poses.iter().enumerate().filter(|(row, _)| !turned.contains(row)).map(|(_, pose)| pose);
+        let whole = still::way(&set, joint);
+        whole > still::STILL && still::way_in(others, joint) < LEAST_WAY * whole
+    };
+    if turned.is_empty() || (0..set.joint_count()).any(moves_alone) {
         return (set, None);
     }
     let finding = Finding::new(

@@ -307,8 +307,8 @@ impl<'a> Search<'a> {
         // What moves evenly is half explained by a step, and the reverse. Where the sensor steps, its rows are cut.
         let steps = placed.causes().filter(|(joint, _)| !is_cut && joint.is_some());
         let steps = steps.filter_map(|(joint, fresh)| self.step(placed, joint, fresh, &order));
-        let mut all: Vec<(f64, Moves)> =
-            ramps.into_iter().map(|(likely, _, moves)| (likely, moves)).chain(steps).collect();
+        let all = ramps.into_iter().map(|(likely, _, moves)| (likely, moves)).chain(steps);
+        let mut all: Vec<(f64, Moves)> = all.filter(|(_, moves)| moves.is_small(self.set)).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let best = all.first()?.0;
         let alike = all.into_iter().take_while(|(likely, _)| best - likely < TOLD_APART);

@@ -4,6 +4,7 @@
 //! joint that steps at a row. Out: a finding where a joint is among them. Goes wrong: a joint that creeps by a degree,
 //! of which all causes are linear: a sensor that moves has more unknowns to follow the rest.
 
+use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::judge::recheck::zero;
 use crate::robot::Robot;
@@ -19,6 +20,16 @@ pub(super) struct Moves {
     pub(super) joint: Option<usize>,
     pub(super) amount: f64,
     pub(super) from: Option<String>,
+}
+
+impl Moves {
+    /// Whether it moves by so little that its effect is linear: the zero of a joint that hardly moves the target would
+    /// have to turn by tens of degrees.
+    pub(super) fn is_small(&self, set: &Dataset) -> bool {
+        /// Six degrees, whose sine and cosine are an angle and one to half a per cent.
+        const LINEAR_MRAD: f64 = 100.0;
+        self.joint.is_none_or(|joint| set.is_sliding(joint) || self.amount.abs() < LINEAR_MRAD)
+    }
 }
 
 /// What is said of drifts where a joint that moves is as likely as a sensor. One that the zero of the first joint
@@ -48,4 +59,18 @@ pub(super) fn of_joints(drifts: &[Drift], robot: &Robot, several: bool) -> Optio
         format!("along the rows{groups} {}{untold}", causes.join(", or ")),
         "look for an encoder, a brake or a gear that slips or a joint that warms up, and measure again: what moved meanwhile is in the result",
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::synthetic;
+
+    #[test]
+    fn a_zero_that_would_turn_by_tens_of_degrees_is_no_cause() {
+        let set = Dataset::new(&synthetic::planned(40, 0, 25.0, 0.02, 1, &|_| {}).rows).unwrap();
+        let small = |joint: Option<usize>, amount: f64| Moves { joint, amount, from: None }.is_small(&set);
+        assert!(small(Some(5), -5.0) && small(Some(5), 90.0) && small(None, 5000.0));
+        assert!(!small(Some(5), 830.0) && !small(Some(0), -110.0));
+    }
 }
