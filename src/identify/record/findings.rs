@@ -87,14 +87,13 @@ impl Findings {
             .or_else(|| plausible::of_all_lengths(found))
             .filter(|_| against.is_empty());
         let terms = plausible::of_terms(found);
-        let lagging = found.formulation().and_then(|formulation| lag::find(set, formulation));
         let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined
             .into_iter()
             .chain(along.instead.clone())
             .chain(rounded)
             .chain(many)
-            .chain(lagging)
+            .chain(found.formulation().and_then(|formulation| lag::find(set, formulation)))
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
