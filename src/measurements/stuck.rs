@@ -3,13 +3,14 @@
 //! An instrument that lost its target, or a program that writes zeros where nothing was read, gives the same point
 //! again and again. In: rows, and the nominal robot. Out: the same rows, those readings taken away, and why. What goes
 //! wrong: the first of such readings may be a true one, after which the instrument stood still; it goes with the
-//! others. A single failed reading is left to the fit, which finds it far off.
+//! others. A single failed reading is left to the fit, which finds it far off, but for a row of zeros: joints that are
+//! as wrong as the point draw the fit there.
 
 use std::collections::BTreeMap;
 
 use nalgebra::{Point3, Vector3};
 
-use super::{Measurement, Observed};
+use super::{Measurement, Observed, Role};
 use crate::robot::Robot;
 
 /// The robot moved where its flange and its target both did by this, mm: built robots are off by less.
@@ -37,6 +38,10 @@ pub(super) fn taken_away(mut rows: Vec<Measurement>, robot: &Robot) -> Vec<Measu
         let least = if *point == [0; 3] { PLACES_OF_ZERO } else { PLACES };
         of.len() >= least && places(of.iter().map(|&i| &rows[i]), robot, least) >= least
     });
+    for row in rows.iter_mut().filter(|row| is_empty(row)) {
+        row.observed =
+            Observed::Missing { reason: "0 in all joints and coordinates: the row was left empty".to_owned() };
+    }
     let stuck: usize = of_point.values().map(Vec::len).sum();
     // Points that were touched again and again in other postures, and are known from elsewhere, are most of their
     // table.
@@ -55,6 +60,12 @@ pub(super) fn taken_away(mut rows: Vec<Measurement>, robot: &Robot) -> Vec<Measu
         of.iter().for_each(|&i| rows[i].observed = Observed::Missing { reason: reason.clone() });
     }
     rows
+}
+
+/// Whether nothing but zeros stands in it; at a centre there may be.
+fn is_empty(row: &Measurement) -> bool {
+    let at_zero = matches!(&row.observed, Observed::Position { point_mm, .. } if *point_mm == Point3::origin());
+    at_zero && row.at.role != Role::Center && row.at.joints_deg.iter().all(|joint| *joint == 0.0)
 }
 
 /// How many places that are apart from each other the robot was at in these rows; no more than `enough` are looked for.
@@ -79,7 +90,6 @@ fn places<'a>(rows: impl Iterator<Item = &'a Measurement>, robot: &Robot, enough
 mod tests {
     use super::*;
     use crate::identify::synthetic::{self, seen_at};
-    use crate::measurements::Role;
 
     /// Rows of the paper's robot, as read from two metres away.
     fn rows(count: usize) -> Vec<Measurement> {
@@ -109,6 +119,28 @@ mod tests {
         };
         let (list, reasons): (Vec<usize>, Vec<String>) = rows.iter().enumerate().filter_map(none).unzip();
         (list, reasons.into_iter().next().unwrap_or_default())
+    }
+
+    #[test]
+    fn a_row_of_zeros_is_none_and_joints_at_zero_or_a_point_at_the_origin_are() {
+        let zeros = |joints: bool, of_point: bool, role: Role| {
+            let mut all = rows(40);
+            if joints {
+                all[7].at.joints_deg.fill(0.0);
+            }
+            if of_point {
+                *point(&mut all[7]) = Point3::origin();
+            }
+            all[7].at.role = role;
+            taken(all)
+        };
+        let (rows, reason) = zeros(true, true, Role::Sample);
+        assert!(rows == [7] && reason.contains("left empty"), "{rows:?} {reason}");
+        for (joints, of_point, role) in
+            [(true, false, Role::Sample), (false, true, Role::Sample), (true, true, Role::Center)]
+        {
+            assert!(zeros(joints, of_point, role).0.is_empty());
+        }
     }
 
     #[test]
