@@ -132,7 +132,7 @@ fn of_one(way_mm: f64, of_robot_mm: f64) -> String {
         return ", although the joints moved: nothing was measured".to_owned();
     }
     format!(
-        " to {way_mm:.4} mm, where the robot moves its target by {of_robot_mm:.0} mm: what was measured stands still (the base, a reference)"
+        " within {way_mm:.4} mm, while the robot moves its target by {of_robot_mm:.0} mm: what was measured stands still (the base, a reference)"
     )
 }
 

@@ -15,7 +15,7 @@ use crate::identify::finding::Finding;
 use crate::identify::judge::pattern::{Explained, explained};
 use crate::identify::residuals::rows::Rows;
 use crate::identify::solve::formulation::Formulation;
-use crate::identify::solve::linearised::Placement;
+use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::robot::Parameter;
 
 /// Chance that poses before that mean nothing are said to mean something.
@@ -28,10 +28,12 @@ const NAMED: f64 = 4.0;
 
 /// Angles or points that know of the pose before.
 pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
-    let lag = explained_by(set, formulation, -1)?;
+    let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
+    let explained_by = |to: isize| explained_by(set, formulation, &linear, to);
+    let lag = explained_by(-1)?;
     let is_told = lag.chance < FALSE_ALARM && lag.share > SHARE;
     // What the poses after explain is as much as the model lacks.
-    let after = if is_told { explained_by(set, formulation, 1).map_or(0.0, |after| after.share) } else { 0.0 };
+    let after = if is_told { explained_by(1).map_or(0.0, |after| after.share) } else { 0.0 };
     if !is_told || lag.share < BEATS * after {
         return None;
     }
@@ -48,11 +50,11 @@ pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
         return None;
     }
     let joints: Vec<String> =
-        named.iter().map(|(joint, percent)| format!("{:.2} % of that of joint {joint}", percent.abs())).collect();
+        named.iter().map(|(joint, percent)| format!("{:.2} % of it in joint {joint}", percent.abs())).collect();
     let what = if behind > 0 { "the angles" } else { "the points" };
     Some(Finding::new(
         format!(
-            "{what} seem to have been read before the arm stood still: {:.0} % of the squares that are left follow the move before each pose, by {}",
+            "{what} seem to have been read before the arm stood still: {:.0} % of the squares that are left follow the move before each pose ({})",
             100.0 * lag.share,
             joints.join(", ")
         ),
@@ -62,7 +64,7 @@ pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
 
 /// What the angles at the poses before (`to` -1) or after (1) explain; the factor of a joint is the share of its move
 /// since then, with the other sign.
-fn explained_by(set: &Dataset, formulation: &Formulation, to: isize) -> Option<Explained> {
+fn explained_by(set: &Dataset, formulation: &Formulation, linear: &Linearised, to: isize) -> Option<Explained> {
     let joints = set.joint_count();
     let offsets: Vec<Option<usize>> = (0..joints)
         .map(|joint| {
@@ -70,7 +72,7 @@ fn explained_by(set: &Dataset, formulation: &Formulation, to: isize) -> Option<E
             formulation.parameters().iter().position(|parameter| *parameter == own)
         })
         .collect();
-    explained(formulation, joints, |placement| columns(set, &formulation.rows, placement, &offsets, to))
+    explained(linear, joints, |placement| columns(set, &formulation.rows, placement, &offsets, to))
 }
 
 /// Of each joint the effect of its angle at the neighbour, then that of its own angle, on the white residuals. Where the
@@ -125,10 +127,11 @@ mod tests {
         for seed in 1..4 {
             assert_eq!(found(seed, 0.0, 0.0, |_| {}), None, "{seed}");
             let said = found(seed, 5e-4, 0.0, |_| {}).unwrap();
-            let (_, shares) = said.rsplit_once("by ").unwrap();
+            let (_, shares) = said.rsplit_once('(').unwrap();
             let named: Vec<(f64, &str)> = shares
+                .trim_end_matches(')')
                 .split(", ")
-                .map(|share| share.split_once(" % of that of joint ").unwrap())
+                .map(|share| share.split_once(" % of it in joint ").unwrap())
                 .map(|(percent, joint)| (percent.parse().unwrap(), joint))
                 .collect();
             assert!(said.starts_with("the angles") && named.len() == 2, "{said}");

@@ -32,13 +32,12 @@ pub struct Explained {
 
 /// What the first `tested` of these columns of each placement explain, everything else that is fitted and the other
 /// columns at their best. `None` where too little is left to tell: with fewer numbers left than the columns take,
-/// little would be noticed.
+/// little would be noticed, and of points that were computed nothing is left at all.
 pub fn explained(
-    formulation: &Formulation,
+    linear: &Linearised,
     tested: usize,
     columns: impl Fn(&Placement) -> DMatrix<f64>,
 ) -> Option<Explained> {
-    let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
     let all: Vec<DMatrix<f64>> = linear.placements.iter().map(columns).collect();
     let kept = 1 + all.first()?.ncols() + linear.shared;
     // Of the residual, the fresh columns and the shared ones, in that order.
@@ -51,8 +50,7 @@ pub fn explained(
     let others = kept - 1 - tested;
     left -= rank(&normal.view((1 + tested, 1 + tested), (others, others)).into_owned()) as f64;
     let normal = Eliminated::new(&normal, 1 + tested).normal;
-    let own = normal.view((1, 1), (tested, tested)).into_owned();
-    let explaining = rank(&own) as f64;
+    let explaining = rank(&normal.view((1, 1), (tested, tested)).into_owned()) as f64;
     left -= explaining;
     if explaining < 1.0 || left < explaining {
         return None;
@@ -60,10 +58,10 @@ pub fn explained(
     let Eliminated { normal: of_residual, follow, inverse } = Eliminated::new(&normal, 1);
     let (whole, unexplained) = (normal[(0, 0)], of_residual[(0, 0)]);
     let scatter = unexplained / left;
-    let ratio = (whole - unexplained) / explaining / scatter;
+    let law = FisherSnedecor::new(explaining, left).ok().filter(|_| scatter > 0.0)?;
     Some(Explained {
         share: (whole - unexplained - explaining * scatter) / whole,
-        chance: FisherSnedecor::new(explaining, left).ok()?.sf(ratio),
+        chance: law.sf((whole - unexplained) / explaining / scatter),
         factors: -follow.column(0),
         sds: inverse.diagonal().map(|variance| (variance * scatter).sqrt()),
     })
@@ -74,7 +72,7 @@ pub fn is_scatter(formulation: &Formulation, set: &Dataset) -> bool {
     let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
     let numbers = linear.placements.iter().flat_map(Placement::by_pose).map(|(_, at)| at.len()).max().unwrap_or(0);
     let count = 2 * set.joint_count() * numbers;
-    explained(formulation, count, |placement| columns(placement, formulation, set, count))
+    explained(&linear, count, |placement| columns(placement, formulation, set, count))
         .is_some_and(|explained| explained.chance > FALSE_ALARM)
 }
 

@@ -1,8 +1,10 @@
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use super::is_scatter;
+use super::{explained, is_scatter};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::solve::linearised::{Linearised, Placement};
 use crate::identify::synthetic::{identified, normal, row, seen_at};
 use crate::measurements::Role;
 use crate::robot::{Robot, catalogue};
@@ -41,4 +43,18 @@ fn readings_that_scatter_by_millimetres_follow_no_joint() {
 fn what_another_arms_file_leaves_follows_the_joints() {
     assert_eq!(scattering("abb-irb120", "ur10", 0.05), 0);
     assert_eq!(scattering("ur10", "kuka-kr6-r900", 0.05), 0);
+}
+
+/// Of points without any error nothing is left that could be explained.
+#[test]
+fn where_nothing_is_left_nothing_is_told() {
+    let nominal = catalogue::robot("abb-irb120").unwrap();
+    let set = measured(&nominal.clone().with_table_2(), 0.05, 1);
+    let found = identified(&set, &nominal);
+    let formulation = found.formulation().unwrap();
+    let mut linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
+    let column = |placement: &Placement| DMatrix::from_fn(placement.poses.len(), 1, |row, _| (row as f64).sin());
+    assert!(explained(&linear, 1, column).is_some());
+    linear.placements.iter_mut().for_each(|placement| placement.at_zero.fill(0.0));
+    assert_eq!(explained(&linear, 1, column), None);
 }
