@@ -12,7 +12,8 @@ use crate::imaging::{Board, Squares};
 #[derive(Debug, Args)]
 pub struct Target {
     /// The target by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker in
-    /// mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm)
+    /// mm, dictionary), apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm), or
+    /// aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the target, not inner corners; key `target_board.squares` [default: 7x6]
@@ -27,8 +28,8 @@ pub struct Target {
 #[derive(Debug, Args)]
 pub struct PrintBoard {
     /// The board as `--board` names it: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and
-    /// marker in mm, dictionary), or apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in
-    /// mm)
+    /// marker in mm, dictionary), apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in
+    /// mm), or aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike)
     #[arg(value_name = "NAME", value_parser = named, required_unless_present = "squares", conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// A plain board of so many squares, as `camera-check` takes it

@@ -95,6 +95,13 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
+    if unexplained_mm.is_some() {
+        for finding in findings.iter_mut().chain(&mut against) {
+            let done = &finding.action;
+            finding.action =
+                format!("what is left is implausible all the same, so that the cause may be another one; {done}");
+        }
+    }
     Mended { set, robot, findings, against, open, unexplained_mm }
 }
 

@@ -49,14 +49,15 @@ impl Dictionary {
             text.eq_ignore_ascii_case(known.name()) || known.name()[TAGS.len()..].eq_ignore_ascii_case(size)
         };
         families().find(same).ok_or_else(|| {
-            let names: Vec<String> = families().map(Dictionary::tag_name).collect();
+            if let Ok(markers) = Dictionary::named(text) {
+                let name = markers.name();
+                return format!(
+                    "{name} are ArUco markers; a grid of them is `aruco:COLSxROWS:{name}:MARKER_MM:GAP_MM`"
+                );
+            }
+            let names: Vec<String> = families().map(Dictionary::said).collect();
             format!("there is no family of tags `{text}`; there are {}", names.join(", "))
         })
-    }
-
-    /// A family of AprilTags as its makers write it.
-    pub fn tag_name(self) -> String {
-        format!("tag{}", self.name().strip_prefix(TAGS).unwrap_or(self.name()).to_ascii_lowercase())
     }
 
     /// Whether it is a family of AprilTags.
@@ -64,9 +65,12 @@ impl Dictionary {
         self.name().starts_with(TAGS)
     }
 
-    /// Its name for a person: AprilTags by the family's.
+    /// Its name for a person: a family of AprilTags as its makers write it.
     pub fn said(self) -> String {
-        if self.is_of_tags() { self.tag_name() } else { self.name().to_owned() }
+        match self.name().strip_prefix(TAGS) {
+            Some(family) => format!("tag{}", family.to_ascii_lowercase()),
+            None => self.name().to_owned(),
+        }
     }
 
     /// All that there are, the smallest first: where two begin alike, it comes before the one that goes on.
@@ -115,7 +119,7 @@ mod tests {
     #[test]
     fn families_of_tags_have_the_names_of_their_makers() {
         for name in ["tag36h11", "t36h11", "36h11", "TAG36H11", "DICT_APRILTAG_36h11"] {
-            assert_eq!(Dictionary::of_tags(name).map(Dictionary::tag_name), Ok("tag36h11".to_owned()), "{name}");
+            assert_eq!(Dictionary::of_tags(name).map(Dictionary::said), Ok("tag36h11".to_owned()), "{name}");
         }
         let why = Dictionary::of_tags("tag36h12").unwrap_err();
         assert!(["tag16h5", "tag25h9", "tag36h11"].iter().all(|name| why.contains(name)), "{why}");

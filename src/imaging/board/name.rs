@@ -1,4 +1,5 @@
-//! Boards by their names: `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`, `apriltag:6x6:tag36h11:35.2:10.56`.
+//! Boards by their names: `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`, `apriltag:6x6:tag36h11:35.2:10.56`,
+//! `aruco:6x4:DICT_6X6_250:30:7.5`.
 //!
 //! In: what was typed, or a board. Out: the board, or the reason why there is none; its name.
 
@@ -23,7 +24,11 @@ impl fmt::Display for Board {
             }
             Kind::Tags { gap_mm, family, layout, .. } => {
                 let ([columns, rows], layout) = (self.tags(), layout.map_or("", Layout::of_name));
-                write!(f, "apriltag:{columns}x{rows}:{}:{side}:{gap_mm}{layout}", family.tag_name())
+                match family.is_of_tags() {
+                    true => write!(f, "apriltag:{columns}x{rows}:{}:{side}:{gap_mm}{layout}", family.said()),
+                    // There is one layout of them.
+                    false => write!(f, "aruco:{columns}x{rows}:{}:{side}:{gap_mm}", family.said()),
+                }
             }
         }
     }
@@ -39,9 +44,9 @@ impl TryFrom<String> for Board {
 impl FromStr for Board {
     type Err = Error;
 
-    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100` or `apriltag:6x6:tag36h11:35.2:10.56`. Squares of a
-    /// board with markers are counted as printed: columns first. A square that is not quite one has a width and a
-    /// height: `checker:20x20:10x10.01`.
+    /// Reads `checker:20x20:10`, `charuco:11x8:15:11:DICT_5X5_100`, `apriltag:6x6:tag36h11:35.2:10.56` or
+    /// `aruco:6x4:DICT_6X6_250:30:7.5`. Squares of a board with markers are counted as printed: columns first. A square
+    /// that is not quite one has a width and a height: `checker:20x20:10x10.01`.
     fn from_str(text: &str) -> Result<Board, Error> {
         let refuse = |why: String| Error::Name { found: text.to_owned(), why };
         let (kind, rest) = text.split_once(':').ok_or_else(|| refuse(without_colon(text)))?;
@@ -54,12 +59,8 @@ impl FromStr for Board {
                 Ok(Board { stretch, ..Board::checker(squares.parse()?, square_mm) })
             }
             ("charuco", [squares, square_mm, marker_mm, dictionary, layout @ ..]) if layout.len() <= 1 => {
-                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
-                    None => None,
-                    Some("new") => Some(Layout::New),
-                    Some("old" | "legacy") => Some(Layout::Old),
-                    Some(other) => return Err(refuse(format!("`{other}` is no layout; there are `old` and `new`"))),
-                };
+                let known = [("old", Layout::Old), ("new", Layout::New), ("legacy", Layout::Old)];
+                let layout = layout_named(layout, &known).map_err(&refuse)?;
                 let ((square_mm, stretch), marker_mm) = (sides(square_mm)?, length(marker_mm)?);
                 let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
                 let board = Board {
@@ -77,30 +78,49 @@ impl FromStr for Board {
                 Err(refuse("a ChArUco board is `charuco:COLSxROWS:SQUARE_MM:MARKER_MM:DICTIONARY`".to_owned()))
             }
             ("apriltag" | "aprilgrid", [tags, family, tag_mm, gap_mm, layout @ ..]) if layout.len() <= 1 => {
-                let layout = match layout.first().map(|word| word.to_ascii_lowercase()).as_deref() {
-                    None => None,
-                    Some("kalibr") => Some(Layout::Tags),
-                    Some("opencv") => Some(Layout::Grid),
-                    Some(other) => {
-                        return Err(refuse(format!("`{other}` is no layout; there are `kalibr` and `opencv`")));
-                    }
-                };
-                let ((square_mm, stretch), gap_mm) = (sides(tag_mm)?, length(gap_mm)?);
+                let known = [("kalibr", Layout::Tags), ("opencv", Layout::Grid)];
+                let layout = layout_named(layout, &known).map_err(&refuse)?;
                 let family = Dictionary::of_tags(family).map_err(&refuse)?;
-                let Squares { columns, rows } = Squares::of_tags(tags)?;
-                let squares = Squares { columns: 2 * columns + 1, rows: 2 * rows + 1 };
-                let kind = Kind::Tags { gap_mm, family, layout, spread_mm: 0.0 };
-                let board = Board { squares, square_mm, stretch, kind };
-                board.check_markers().map(|()| board).map_err(refuse)
+                of_tags(Squares::of_tags(tags)?, family, [tag_mm, gap_mm], layout).map_err(refuse)
+            }
+            ("aruco" | "gridboard", [tags, dictionary, marker_mm, gap_mm]) => {
+                let dictionary = Dictionary::named(dictionary).map_err(&refuse)?;
+                of_tags(Squares::of_tags(tags)?, dictionary, [marker_mm, gap_mm], Some(Layout::Grid)).map_err(refuse)
             }
             ("apriltag" | "aprilgrid", _) => Err(refuse(
                 "a grid of AprilTags is `apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM`, counted in tags".to_owned(),
             )),
+            ("aruco" | "gridboard", _) => Err(refuse(
+                "a grid of ArUco markers is `aruco:COLSxROWS:DICTIONARY:MARKER_MM:GAP_MM`, counted in markers"
+                    .to_owned(),
+            )),
             (other, _) => Err(refuse(format!(
-                "there is no kind of board named `{other}`; there are checker, charuco and apriltag"
+                "there is no kind of board named `{other}`; there are checker, charuco, apriltag and aruco"
             ))),
         }
     }
+}
+
+/// The layout that a name ends with, if it says one; the reason where it is none of those known, of which the first two
+/// are named.
+fn layout_named(said: &[&str], known: &[(&str, Layout)]) -> Result<Option<Layout>, String> {
+    let Some(word) = said.first() else { return Ok(None) };
+    let same = known.iter().find(|(name, _)| word.eq_ignore_ascii_case(name));
+    let names = || known.iter().take(2).map(|(name, _)| format!("`{name}`")).collect::<Vec<_>>().join(" and ");
+    same.map(|(_, layout)| Some(*layout)).ok_or_else(|| format!("`{word}` is no layout; there are {}", names()))
+}
+
+/// A grid of tags or markers of a side and a gap; the reason where there can be none.
+fn of_tags(
+    Squares { columns, rows }: Squares,
+    family: Dictionary,
+    [side_mm, gap_mm]: [&str; 2],
+    layout: Option<Layout>,
+) -> Result<Board, String> {
+    let ((square_mm, stretch), gap_mm) = (sides_mm(side_mm)?, length_mm(gap_mm)?);
+    let squares = Squares { columns: 2 * columns + 1, rows: 2 * rows + 1 };
+    let board = Board { squares, square_mm, stretch, kind: Kind::Tags { gap_mm, family, layout, spread_mm: 0.0 } };
+    board.check_markers().map(|()| board)
 }
 
 /// What a name lacks that has no `:`.
@@ -201,7 +221,7 @@ impl Board {
                 Err(format!("gaps of {gap_mm} mm between tags of {square_mm} mm are no grid's"))
             }
             Kind::Tags { family, .. } => {
-                let ([columns, rows], name, count) = (self.tags(), family.tag_name(), family.count());
+                let ([columns, rows], name, count) = (self.tags(), family.said(), family.count());
                 let lacks = format!("{columns}x{rows} tags are {}, {name} has {count}", columns * rows);
                 if columns * rows <= count { Ok(()) } else { Err(lacks) }
             }
@@ -225,6 +245,7 @@ mod tests {
             "apriltag:7x4:tag25h9:40x40.1:8",
             "apriltag:7x4:tag25h9:40:8:opencv",
             "apriltag:7x4:tag25h9:40:8:kalibr",
+            "aruco:6x4:DICT_6X6_250:30:7.5",
         ] {
             let board: Board = text.parse().unwrap();
             assert_eq!(board.to_string(), text);
@@ -234,6 +255,8 @@ mod tests {
         for (other, usual) in [
             ("chessboard:9x7:20", "checker:9x7:20"),
             ("aprilgrid:6x6:tag36h11:35.2:10.56", "apriltag:6x6:tag36h11:35.2:10.56"),
+            ("aruco:6x4:6x6_250:30:7.5", "aruco:6x4:DICT_6X6_250:30:7.5"),
+            ("aruco:6x4:DICT_APRILTAG_36h11:30:7.5", "apriltag:6x4:tag36h11:30:7.5:opencv"),
         ] {
             assert_eq!(other.parse::<Board>().unwrap(), usual.parse().unwrap());
         }
@@ -245,7 +268,11 @@ mod tests {
             ("20x20", "`checker:20x20:25`"),
             ("board", "no `:`"),
             ("checker:20x20", "checker:COLSxROWS:SQUARE_MM"),
-            ("dots:20x20:10", "there are checker, charuco and apriltag"),
+            ("dots:20x20:10", "there are checker, charuco, apriltag and aruco"),
+            ("aruco:6x4:DICT_6X6_250:30", "aruco:COLSxROWS:DICTIONARY:MARKER_MM:GAP_MM"),
+            ("aruco:6x4:DICT_9X9_250:30:7.5", "no dictionary `DICT_9X9_250`"),
+            ("aruco:10x6:DICT_4X4_50:30:7.5", "10x6 tags are 60, DICT_4X4_50 has 50"),
+            ("apriltag:6x4:DICT_6X6_250:30:7.5", "a grid of them is `aruco:COLSxROWS:DICT_6X6_250:MARKER_MM:GAP_MM`"),
             ("checker:20x20:10x12", "no square"),
             ("apriltag:6x6:tag36h11:35.2:10.56:opncv", "`kalibr` and `opencv`"),
             ("apriltag:6x6:tag36h11:35.2", "apriltag:COLSxROWS:FAMILY:TAG_MM:GAP_MM"),

@@ -59,7 +59,7 @@ pub fn of_other_kind(picture: &Picture, asked: &Board) -> Option<String> {
         })?;
         Some(match pitch {
             Pitch::Even => format!("{HAS_MARKERS}{} in its squares", dictionary.name()),
-            Pitch::Tags { .. } => format!("{HAS_TAGS}{}", dictionary.tag_name()),
+            Pitch::Tags { .. } => format!("{HAS_TAGS}{}", dictionary.said()),
         })
     })
 }

@@ -1,4 +1,5 @@
-//! Grids of tags that nothing dark touches, as OpenCV prints them: found in any part of them.
+//! Grids of tags that nothing dark touches, as OpenCV prints them, of AprilTags or ArUco markers: found in any part of
+//! them.
 //!
 //! In: a picture and the board. Out: a reduced copy and the board's corners on it as far as they are seen, each at its
 //! place on the board. Method: dark shapes of four sides (`quads`), on copies from coarse to fine until the tags' bits
@@ -11,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Matrix3, Point2};
 
 use super::detection::{self, ENOUGH_MARGIN_PX, levels, without_strays};
-use super::marker::{Fields, Marker, fields, grey_at, mapped, read, square_map};
+use super::marker::{Fields, Marker, TAG_BORDERS, fields, grey_at, mapped, read, square_map};
 use super::numbering::{AGREEING, tolerated};
 use super::quads::{Quad, quads};
 use crate::imaging::Board;
@@ -61,7 +62,8 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 match detection::detect(picture, board.with_layout(Layout::Tags)) {
                     Ok(_) => Err(said(Layout::Tags)),
                     Err(_) if matches!(seen, Seen::WithSquares) => Err(said(Layout::Tags)),
-                    Err(_) => Err("shows no tag of the board that can be read".to_owned().into()),
+                    Err(_) => Err(of_another_family(picture, &board)
+                        .unwrap_or_else(|| "shows no tag of the board that can be read".to_owned().into())),
                 }
             }
         },
@@ -284,7 +286,8 @@ fn judged(picture: &Picture, board: &Board, tags: &[Tag], (level, copy): (Level,
     // The only tag of a board of one needs no other.
     let is_whole = columns * rows == 1 && tags.len() == 1 && tags[0].number == 0;
     if !is_whole && !order.is_sure(tags.len().max(2)) {
-        return unlike(board, tags, (1..=MOST_COLUMNS).filter(|other| *other != columns).map(of));
+        let others = (1..=MOST_COLUMNS).filter(|other| *other != columns).map(of);
+        return of_another_family(picture, board).map_or_else(|| unlike(board, tags, others), Seen::Other);
     }
     let kept: Vec<usize> = if is_whole { vec![0] } else { order.confirmed.clone() };
     let mut by_number: BTreeMap<usize, usize> = BTreeMap::new();
@@ -312,6 +315,41 @@ fn laid(board: &Board, tags: &[Tag], by_number: &BTreeMap<usize, usize>, upside_
         let tag = &tags[*by_number.get(&(row / 2 * columns + col / 2))?];
         let corner = [[0, 1], [3, 2]][row % 2][col % 2];
         Some(tag.corners[if upside_down { (corner + 2) % 4 } else { corner }])
+    })
+}
+
+/// What is said of a picture with tags of another family or dictionary, where more are read than chance finds.
+fn of_another_family(picture: &Picture, board: &Board) -> Option<Refusal> {
+    const COPIES: usize = 2;
+    const FEWEST: usize = 4;
+    let Kind::Tags { family, gap_mm, .. } = board.kind else { return None };
+    let gap = gap_mm / board.square_mm;
+    let ways = TAG_BORDERS.into_iter().flat_map(|border| (4..=7).map(move |bits| Fields::of_tag(gap, bits, border)));
+    let ways: Vec<Fields> = ways.collect();
+    let is_of = |marker: &Marker, family: Dictionary| {
+        let turns = [0, 1, 2, 3].map(|quarters| marker.turned(quarters).code);
+        (0..family.count()).any(|id| family.code(id).is_some_and(|code| turns.contains(&code)))
+    };
+    levels(picture).take(COPIES).find_map(|level| {
+        let shapes = quads(&level.copy(picture)).into_iter().map(|quad| quad.map(|p| level.to_picture(&p)));
+        let shapes: Vec<Quad> = shapes.collect();
+        let mut best: Option<(usize, Dictionary)> = None;
+        for fields in &ways {
+            let read = |quad: &Quad| read(picture, quad, *fields).filter(|marker| !marker.inverted);
+            let markers: Vec<Marker> = shapes.iter().filter_map(read).collect();
+            // The board's own first: others begin with the same markers.
+            let all = std::iter::once(family).chain(Dictionary::all());
+            for other in all.filter(|other| other.bits() == fields.bits) {
+                let known = markers.iter().filter(|marker| is_of(marker, other)).count();
+                let is_more = best.is_none_or(|(most, _)| known > most);
+                if is_more && known >= FEWEST && 2 * known > markers.len() {
+                    best = Some((known, other));
+                }
+            }
+        }
+        let (_, other) = best.filter(|(_, other)| *other != family)?;
+        let reason = format!("shows markers of {}, the board has those of {}", other.said(), family.said());
+        Some(Refusal { reason, seen: board.with_dictionary(other) })
     })
 }
 

@@ -28,6 +28,14 @@ fn measured(said: &str, picture: &Picture, truth: &[Point2<f64>]) -> (usize, f64
     (count, sum / count.max(1) as f64)
 }
 
+/// Grids of ArUco markers, from few bits to many.
+const ARUCO: [&str; 4] = [
+    "aruco:5x4:DICT_4X4_50:24:7.2",
+    "aruco:5x4:DICT_5X5_1000:24:6",
+    "aruco:5x4:DICT_6X6_250:24:7.2",
+    "aruco:5x4:DICT_ARUCO_ORIGINAL:24:4.8",
+];
+
 fn refusal(picture: &Picture, said: &str) -> String {
     corners_in(picture, said.parse().unwrap()).map(|corners| corners.count()).expect_err(said).reason
 }
@@ -47,6 +55,22 @@ fn a_grid_is_measured_from_every_side_whether_or_not_its_layout_is_said() {
         assert!(layout == Layout::Grid && found >= 76, "{quarter}: {layout:?}, {found} of 80 corners");
     }
     assert!((0.75..1.25).contains(&sum), "{sum}");
+}
+
+#[test]
+fn grids_of_aruco_markers_are_measured_and_other_dictionaries_named() {
+    for (k, said) in ARUCO.into_iter().enumerate() {
+        let turn = [0.3, -0.25, 0.2 + k as f64 * 1.6];
+        let (picture, truth) = Shot::of(said, turn, [3.0, -2.0, 380.0]).taken();
+        let (count, chi2) = measured(said, &picture, &truth);
+        assert!(count >= 76 && chi2 < 1.5, "{said}: {count} of 80 corners, {chi2}");
+        let other = ARUCO[(k + 1) % ARUCO.len()];
+        let dictionary = said.split(':').nth(2).unwrap();
+        let reason = refusal(&picture, other);
+        // The smallest one that has these markers.
+        let seen = dictionary.replace("1000", "50").replace("250", "50");
+        assert!(reason.contains(&format!("shows markers of {seen}")), "{said}, asked for {other}: {reason}");
+    }
 }
 
 #[test]

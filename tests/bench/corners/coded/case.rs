@@ -69,7 +69,7 @@ fn board(kind: Coded, number: usize) -> Board {
             let family = families[number % families.len()];
             let gap = [0.2, 0.3, 0.4][number / families.len() % 3];
             let layout = if matches!(kind, Coded::Grid) { ":opencv" } else { "" };
-            format!("apriltag:6x4:{}:{TAG_MM}:{}{layout}", family.tag_name(), TAG_MM * gap)
+            format!("apriltag:6x4:{}:{TAG_MM}:{}{layout}", family.said(), TAG_MM * gap)
         }
     };
     name.parse().unwrap()
