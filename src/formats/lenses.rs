@@ -1,13 +1,14 @@
 //! Lenses that are known, from the calibrations of other days and programs.
 //!
 //! In: files with one camera or two, each with the side that it is for where only one is meant. Out: [`KnownLenses`]. A
-//! rig's file gives both lenses, or that of the side that is asked for; a file of one camera (ROS, mrcal, OpenCV's
-//! example, a Kalibr chain of one) needs the side.
+//! file of two cameras gives both lenses, or that of the side that is asked for; a file of one camera (ROS, mrcal,
+//! OpenCV's sample, a Kalibr chain of one) needs the side, where no other stands beside it as a rig's do.
 
 use std::str::FromStr;
 
-use camino::{Utf8Path, Utf8PathBuf};
+use camino::Utf8PathBuf;
 
+use super::export::Cameras;
 use super::{calibration, export};
 use crate::files::{self, Result};
 use crate::imaging::Side;
@@ -43,20 +44,35 @@ pub fn read(named: &[LensFile]) -> Result<Option<KnownLenses>> {
     Ok(all.into_iter().reduce(KnownLenses::and))
 }
 
+/// How arrays become a file that is read.
+const AS_TEXT: &str = "write it as text: `f = cv2.FileStorage('left.yml', cv2.FILE_STORAGE_WRITE)`, then `f.write(name, value)` of image_width, \
+                       image_height, camera_matrix and distortion_coefficients, and `f.release()`";
+
 const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
 
 fn read_one(file: &LensFile) -> Result<KnownLenses> {
     let LensFile { path, side } = file;
-    if let Some(side) = side
-        && let Some(camera) = one_camera(path)?
-    {
-        return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| (of == *side).then_some(camera))));
+    let refused = |message: String, hint: &str| files::Error::format(path, None, message, Some(hint));
+    if path.extension().is_some_and(|extension| ["npz", "npy", "mat", "pkl"].contains(&extension)) {
+        return Err(refused("a file of arrays, of which nothing says which is which".to_owned(), AS_TEXT));
     }
-    let read = calibration::read(path).map_err(|error| match (error, side) {
-        (files::Error::Format { message, place, hint: None }, None) => {
-            let hint = Some(format!("of a file with one camera say which: `--intrinsics {path},left`"));
-            files::Error::Format { message, place, hint }
+    let text = files::read_text(path, "file of a lens", Some("`--intrinsics FILE,left` or `--intrinsics FILE,right`"))?;
+    let asked = |of: Side| side.is_none_or(|side| side == of);
+    let in_file = export::read_cameras(&text).transpose().map_err(|message| refused(message, HINT))?;
+    match in_file {
+        Some(Cameras::One(camera)) if side.is_some() => {
+            return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| asked(of).then_some(camera))));
         }
+        Some(Cameras::Two(both)) => {
+            return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| asked(of).then_some(both[of as usize]))));
+        }
+        _ => {}
+    }
+    let read = calibration::read(path).map_err(|error| match (error, in_file) {
+        (files::Error::Format { message, hint: None, .. }, Some(_)) => refused(
+            format!("the file holds one camera, and as one of a rig: {message}"),
+            &format!("say whose lens it is: `--intrinsics {path},left`"),
+        ),
         (other, _) => other.with_hint(HINT),
     })?;
     let sides = side.map_or(Side::BOTH.to_vec(), |side| vec![side]);
@@ -66,11 +82,4 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
     known.pair_motion = read.pair_motion.filter(|_| known.both());
     known.pair_excess = read.pair_excess.unwrap_or(1.0);
     Ok(known)
-}
-
-/// The camera of a file that holds one; `None` where it holds a rig.
-fn one_camera(path: &Utf8Path) -> Result<Option<crate::stereo::Camera>> {
-    let text = files::read_text(path, "file of a lens", Some("`--intrinsics FILE,left` or `--intrinsics FILE,right`"))?;
-    let camera = export::read_camera(&text);
-    camera.transpose().map_err(|message| files::Error::format(path, None, message, None))
 }

@@ -56,7 +56,7 @@ pub fn run(args: &CameraCheck, config: &Config, run: Run) -> Result<Outcome> {
     demand.lens_pairs = pairs_of_lenses(args, pairing.as_ref(), &out);
     demand.lens_pairs.statement().iter().for_each(progress::warn);
     let corners = corners(args, board, pairing.as_ref(), known.as_ref(), &out)?;
-    known.as_ref().map_or(Ok(()), |known| known.check_size(&corners))?;
+    let known = known.map(|known| known.of_pictures(&corners)).transpose()?;
     let asked = Asked { options: options(args, known), tolerance_mm: demand.tolerance_mm, extent: demand.extent };
     let corners = open_numbers::by_other_pairs(corners, &asked.options);
     corners.notes.iter().for_each(progress::note);
@@ -249,10 +249,11 @@ fn known_lenses(args: &CameraCheck) -> Result<Option<KnownLenses>> {
         let camera = known.as_ref().filter(|known| !known.states_covariance(side)).and_then(|known| known.camera(side));
         if let Some(camera) = camera {
             progress::note(format!(
-                "the {} lens ({}) comes without a covariance: it is taken to {} % of its focal length",
+                "the {} lens ({}) comes without a covariance: it is taken to {} % of its focal length{}",
                 side.name(),
                 camera.lens.name(),
-                100.0 * TOLERANCE
+                100.0 * TOLERANCE,
+                if camera.width == 0 { ", and for pictures of this size, for the file says none" } else { "" }
             ));
         }
     }

@@ -62,7 +62,7 @@ fn mm(metres: f64) -> f64 {
     (metres * 1e9).round() / 1e6
 }
 
-/// Longest side of a tag in Kalibr's file, mm: longer ones were meant as mm.
+/// Longest side of a tag or square in Kalibr's file, mm: longer ones were meant as mm.
 const MOST_TAG_MM: f64 = 3000.0;
 
 fn by_kalibr(text: &str) -> Result<Board, String> {
@@ -76,6 +76,9 @@ fn by_kalibr(text: &str) -> Result<Board, String> {
             let (across, along) = (number("colSpacingMeters")?, number("rowSpacingMeters")?);
             if (across - along).abs() > 1e-9 * across.abs() {
                 return Err(format!("its squares are {} x {} mm; only square ones are read", mm(across), mm(along)));
+            }
+            if mm(across) > MOST_TAG_MM {
+                return Err(format!("squares of {} mm: `colSpacingMeters` is in metres", mm(across)));
             }
             checker(number("targetCols")?, number("targetRows")?, mm(across))
         }

@@ -6,12 +6,13 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::scan::{behind, list, number};
-use super::written::{ExportedFile, camera, matrix};
+use super::cameras;
+use super::scan::list;
+use super::written::{ExportedFile, matrix};
 use crate::formats::checked;
 use crate::geometry::rotation_matrix;
 use crate::stereo::model::rectification::{Matrices, Scaling, essential, fundamental};
-use crate::stereo::{Camera, Error, Rig};
+use crate::stereo::{Error, Rig};
 
 /// One file for the rig. An error where OpenCV cannot rectify it.
 pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
@@ -44,37 +45,11 @@ pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
 
 /// Reads the same back.
 pub fn read(text: &str) -> Result<Rig, String> {
-    let size = (number(text, "image_width")?, number(text, "image_height")?);
-    let right_size = match (number(text, "right_image_width"), number(text, "right_image_height")) {
-        (Ok(width), Ok(height)) => (width, height),
-        _ => size,
-    };
+    let [left, right] = cameras::two(text).ok_or("no `M1`, `D1`, `M2` and `D2`")??;
+    if left.width == 0 {
+        return Err("no `image_width` and `image_height`: add both lines, the size of the pictures".to_owned());
+    }
     let rotation = Matrix3::from_row_slice(&list(text, "R", Some(9))?);
     let translation = Vector3::from_row_slice(&list(text, "T", Some(3))?);
-    checked::rig((one(text, size, "M1", "D1")?, one(text, right_size, "M2", "D2")?), ("R", rotation), translation, None)
-}
-
-/// Names that programs give the matrix and the coefficients of a single camera: OpenCV's example of today and of its
-/// second version, and what people write by hand.
-const SINGLE: [(&str, &str); 4] = [
-    ("camera_matrix", "distortion_coefficients"),
-    ("Camera_Matrix", "Distortion_Coefficients"),
-    ("cameraMatrix", "distCoeffs"),
-    ("K", "D"),
-];
-
-/// The camera of a file that holds one. `None` where it holds another number of them.
-pub fn read_camera(text: &str) -> Option<Result<Camera, String>> {
-    let (matrix, distortion) = SINGLE.into_iter().find(|(matrix, _)| matches!(behind(text, matrix), Ok(Some(_))))?;
-    let side = |keys: [&str; 2]| keys.into_iter().find_map(|key| number(text, key).ok());
-    let size = || {
-        let found = side(["image_width", "image_Width"]).zip(side(["image_height", "image_Height"]));
-        found.ok_or("no `image_width` and `image_height`: the size of the pictures is needed".to_owned())
-    };
-    Some(size().and_then(|size| one(text, size, matrix, distortion)))
-}
-
-fn one(text: &str, size: (f64, f64), matrix: &str, distortion: &str) -> Result<Camera, String> {
-    let m = list(text, matrix, Some(9))?;
-    camera(size, &[m[0], m[4], m[2], m[5]], &list(text, distortion, None)?)
+    checked::rig((left, right), ("R", rotation), translation, None)
 }

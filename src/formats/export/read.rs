@@ -6,9 +6,10 @@
 
 use camino::Utf8Path;
 
+use super::cameras::{self, Cameras, as_yaml};
 use super::{file_storage, kalibr, mrcal, ros};
 use crate::files;
-use crate::stereo::{Camera, Rig};
+use crate::stereo::Rig;
 
 /// The files that [`read`] is given, by the names under which they are written: of two, the left camera's.
 pub const NAMES: [&str; 4] = ["stereo_opencv.yml", "left.yaml", "camchain.yaml", "left.cameramodel"];
@@ -36,22 +37,23 @@ pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
     if text.contains("T_cn_cnm1:") {
         return Some(kalibr::read(text));
     }
+    let text = &*as_yaml(text);
     text.contains("!!opencv-matrix").then(|| file_storage::read(text))
 }
 
-/// Reads a file that holds one camera: ROS, mrcal, OpenCV's example, a Kalibr chain of one. `None` where the text is
-/// none of them.
-pub fn read_camera(text: &str) -> Option<Result<Camera, String>> {
+/// Reads the lenses of a file: of one camera (ROS, mrcal, OpenCV's sample, a Kalibr chain of one), or of two by the names
+/// of OpenCV's stereo sample. `None` where the text is none of them.
+pub fn read_cameras(text: &str) -> Option<Result<Cameras, String>> {
     if text.contains("'lensmodel'") {
-        return Some(mrcal::read_camera(text));
+        return Some(mrcal::read_camera(text).map(Cameras::One));
     }
     if text.contains("distortion_model:") && text.contains("camera_matrix:") {
-        return Some(ros::read_camera(text));
+        return Some(ros::read_camera(text).map(Cameras::One));
     }
     if text.contains("cam0:") && !text.contains("cam1:") {
-        return Some(kalibr::read_camera(text));
+        return Some(kalibr::read_camera(text).map(Cameras::One));
     }
-    file_storage::read_camera(text)
+    cameras::read(&as_yaml(text))
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+use super::cameras::pinhole;
 use super::scan::{list, number, word};
 use super::written::{ExportedFile, METRE, camera, numbers, within};
 use crate::formats::checked;
@@ -56,7 +57,7 @@ pub fn read_camera(text: &str) -> Result<Camera, String> {
         "rational_polynomial" => 8,
         other => return Err(format!("distortion_model is `{other}`; plumb_bob and rational_polynomial are read")),
     };
-    camera(size, &[m[0], m[4], m[2], m[5]], &list(text, "distortion_coefficients", Some(count))?)
+    camera(size, &pinhole("camera_matrix", &m)?, &list(text, "distortion_coefficients", Some(count))?)
 }
 
 /// Reads the same back: the rig from both rectifications and the right projection.

@@ -120,10 +120,11 @@ fn matrix(key: &str, indent: usize, rest: &str) -> Result<Vec<f64>, String> {
     }
     let block = &rest[..end];
     let data = behind(block, "data")?.ok_or_else(|| format!("`{key}` has no list of numbers"))?;
-    if !data.trim_start().starts_with('[') {
-        return Err(format!("`{key}` has no list of numbers"));
-    }
-    let numbers = brackets(key, data)?.0;
+    let numbers = match data.trim_start() {
+        list if list.starts_with('[') => brackets(key, data)?.0,
+        list if list.starts_with('-') => dashes(key, list)?,
+        _ => return Err(format!("`{key}` has no list of numbers")),
+    };
     if let (Some(_), Some(_)) = (behind(block, "rows")?, behind(block, "cols")?) {
         let (rows, columns) = (number(block, "rows")?, number(block, "cols")?);
         if rows * columns != numbers.len() as f64 {
@@ -140,7 +141,7 @@ mod tests {
     #[test]
     fn lists_in_every_form() {
         let text = "a: [1, 2,\n  3]\nb:\n- [1, 2]\n- [3, 4]\nc:\n- 1.5\n- 2\nd: [[1, 2], [3, 4]]\ne: !!opencv-matrix\n   rows: 1\n   cols: 2\n   \
-                    dt: d\n   data: [ 1., 2. ]\n'f': [ 7,],\n";
+                    dt: d\n   data: [ 1., 2. ]\n'f': [ 7,],\ng:\n  cols: 2\n  data:\n  - 1.0\n  - -2.5\n  rows: 1\n";
         for (key, numbers) in [
             ("a", vec![1.0, 2.0, 3.0]),
             ("b", vec![1.0, 2.0, 3.0, 4.0]),
@@ -148,6 +149,7 @@ mod tests {
             ("d", vec![1.0, 2.0, 3.0, 4.0]),
             ("e", vec![1.0, 2.0]),
             ("f", vec![7.0]),
+            ("g", vec![1.0, -2.5]),
         ] {
             assert_eq!(list(text, key, Some(numbers.len())), Ok(numbers), "{key}");
         }

@@ -8,13 +8,14 @@
 //! readings, and which fits as well, is taken. A joint that moves the target little (the last one, with a target near
 //! its axis) shows in neither: there the likelihood of what the fits leave decides. Nothing is mended that none proves,
 //! nothing that sessions along the rows explain better, and nothing that two robots explain about as well. What goes
-//! wrong: two faults at once are found one after the other only where each alone brings an improvement. What the
-//! target's unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
+//! wrong: two faults at once are found one after the other only where each alone brings an improvement, but for signs of
+//! joints ([`counting`]). What the target's unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
 
 use std::iter;
 
 use rayon::prelude::*;
 
+use super::counting;
 use super::hypothesis::{Hypothesis, hypotheses, still};
 pub use super::misfit::IMPLAUSIBLE_MM;
 use super::misfit::{ALIKE, DOUBTED_MM, EXPLAINS, Look, Misfit, some_rows};
@@ -70,6 +71,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         if tried.is_empty() {
             tried = explaining(if unexplained { Look::All } else { Look::OfOneJoint });
         }
+        // Several faults of counting at once are asked for where none alone does.
+        if now.fitted >= IMPLAUSIBLE_MM && !makes_plausible(&tried) {
+            let several = counting::likeliest(&set, &robot);
+            let several = self::explaining(&several, &set, &robot, settings, &now, Look::All);
+            if makes_plausible(&several) {
+                tried = several;
+            }
+        }
         let best = Likeliest::of(&tried).filter(|best| cut.is_none_or(|cut| best.there.fitted < cut));
         let Some(best) = best else { break };
         if !best.rivals.is_empty() {
@@ -103,6 +112,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         }
     }
     Mended { set, robot, findings, against, open, unexplained_mm }
+}
+
+/// Whether one of them leaves what a built robot may leave.
+fn makes_plausible(tried: &[(Misfit, Hypothesis)]) -> bool {
+    tried.iter().any(|(there, hypothesis)| there.fitted * hypothesis.factor() < IMPLAUSIBLE_MM)
 }
 
 /// The likeliest of the hypotheses that were tried.

@@ -35,8 +35,57 @@ pub enum Hypothesis {
     Lagging(Option<usize>, isize),
     /// The robot's parameters are standard DH ones.
     StandardDh,
+    /// Several joints are counted otherwise.
+    Counted(Counting),
     /// Points are in a left-handed frame.
     Mirrored,
+}
+
+/// How joints are counted, of several at once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Counting {
+    /// A bit for each joint that is counted the other way round, the first joint's the lowest.
+    pub negated: u32,
+    /// A joint, before it is turned round: its reading holds so many times that of the one before it.
+    pub coupled: Option<(usize, f64)>,
+}
+
+impl Counting {
+    /// Whether it is about more than one fault.
+    pub fn is_of_several(&self) -> bool {
+        self.negated.count_ones() + u32::from(self.coupled.is_some()) > 1
+    }
+
+    /// The joints that are counted the other way round.
+    fn negated(&self) -> Vec<usize> {
+        (0..u32::BITS as usize).filter(|joint| self.negated >> joint & 1 == 1).collect()
+    }
+
+    /// Readings, rad, and the robot as they are if it holds.
+    pub fn applied(&self, joints_rad: &[Vec<f64>], robot: &Robot) -> (Vec<Vec<f64>>, Robot) {
+        let (mut rows, mut robot) = (joints_rad.to_vec(), robot.clone());
+        if let Some((joint, times)) = self.coupled {
+            rows.iter_mut().for_each(|row| row[joint] -= times * row[joint - 1]);
+        }
+        for joint in self.negated() {
+            robot.joints[joint].sign = -robot.joints[joint].sign;
+        }
+        (rows, robot)
+    }
+
+    /// The joints that are negated, by their numbers.
+    fn numbers(&self) -> String {
+        self.negated().iter().map(|joint| (joint + 1).to_string()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Those negated in words; `None` where there are none.
+    fn signs(&self) -> Option<String> {
+        match self.negated.count_ones() {
+            0 => None,
+            1 => Some(format!("joint {} is counted the other way round (its sign is flipped)", self.numbers())),
+            _ => Some(format!("joints {} are counted the other way round (their signs are flipped)", self.numbers())),
+        }
+    }
 }
 
 /// Sine of a twist whose sign matters: a smaller one is an error of manufacture.
@@ -150,14 +199,18 @@ impl Hypothesis {
             Hypothesis::Lagging(None, by) => format!("the joints lag {by} row against the readings"),
             Hypothesis::Lagging(Some(i), by) => format!("joint {} lags {by} row against the others", i + 1),
             Hypothesis::StandardDh => "the robot file holds standard DH parameters, not modified ones (MDH)".to_owned(),
+            Hypothesis::Counted(counting) => {
+                let coupled = counting.coupled.map(|(i, times)| Hypothesis::Coupled(i, times).name());
+                counting.signs().into_iter().chain(coupled).collect::<Vec<_>>().join(", and ")
+            }
             Hypothesis::Mirrored => "the coordinates are mirrored: a left-handed frame".to_owned(),
         }
     }
 
     /// Whether readings of the joints, in other files too, mean something else than the robot file says.
     pub fn is_of_counting(self) -> bool {
-        use Hypothesis::{Coupled, Exchanged, Negated, Offset, StandardDh, Twisted};
-        matches!(self, Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh | Twisted(_))
+        use Hypothesis::{Counted, Coupled, Exchanged, Negated, Offset, StandardDh, Twisted};
+        matches!(self, Counted(_) | Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh | Twisted(_))
     }
 
     /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot
@@ -181,6 +234,16 @@ impl Hypothesis {
                 format!(
                     "the table: joint {joint} as j{joint} {there} j{before}, in targets too, and j{joint} {back} j{before} in what `compensate` writes"
                 )
+            }
+            Hypothesis::Counted(counting) => {
+                let signs = counting.signs().map(|_| {
+                    format!(
+                        "the `sign` of joints {} in the robot file where the controller counts so, else the table",
+                        counting.numbers()
+                    )
+                });
+                let coupled = counting.coupled.map(|(i, times)| Hypothesis::Coupled(i, times).mend());
+                signs.into_iter().chain(coupled).collect::<Vec<_>>().join("; and ")
             }
             Hypothesis::StandardDh => "the robot file: `robot import TABLE --dh classic` reads such rows".to_owned(),
             Hypothesis::Mirrored => {
@@ -220,6 +283,12 @@ impl Hypothesis {
             Hypothesis::Offset(i, deg) => robot.joints[i].theta_rad += deg.to_radians(),
             Hypothesis::Twisted(i) => robot.joints[i].alpha_rad = -robot.joints[i].alpha_rad,
             Hypothesis::Lagging(joint, by) => set = lagging(set, joint, by),
+            Hypothesis::Counted(counting) => {
+                let joints: Vec<Vec<f64>> = set.poses.iter().map(|pose| pose.joints_rad.clone()).collect();
+                let (rows, counted) = counting.applied(&joints, &robot);
+                set.poses.iter_mut().zip(rows).for_each(|(pose, row)| pose.joints_rad = row);
+                robot = counted;
+            }
             Hypothesis::StandardDh => robot = from_standard(&robot),
             Hypothesis::Mirrored => {
                 set.mirrored = !set.mirrored;

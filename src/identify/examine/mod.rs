@@ -3,6 +3,7 @@
 
 mod all;
 pub mod conventions;
+mod counting;
 pub mod covariances;
 mod hypothesis;
 pub mod in_hand;

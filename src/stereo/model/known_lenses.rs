@@ -101,12 +101,20 @@ impl KnownLenses {
         self.cameras[side as usize].as_ref()
     }
 
-    /// Pictures of another size than the lens's were binned, cut or taken by another camera.
-    pub fn check_size(&self, corners: &Corners) -> Result<(), Error> {
+    /// The same for pictures of this size, which a lens of none has then. Pictures of another size than the lens's were
+    /// binned, cut or taken by another camera.
+    pub fn of_pictures(self, corners: &Corners) -> Result<KnownLenses, Error> {
         let sizes = [corners.left_size, corners.right_size];
-        Side::BOTH.into_iter().try_for_each(|side| {
-            self.camera(side).map_or(Ok(()), |camera| camera.check_picture_size(side, sizes[side as usize]))
-        })
+        let sized = |side: Side| {
+            let (width, height) = sizes[side as usize];
+            self.camera(side).filter(|camera| camera.width == 0).map(|camera| Camera { width, height, ..*camera })
+        };
+        let sized = Side::BOTH.map(sized);
+        let known = if sized.iter().any(Option::is_some) { self.and(KnownLenses::of_cameras(sized)) } else { self };
+        for side in Side::BOTH {
+            known.camera(side).map_or(Ok(()), |camera| camera.check_picture_size(side, sizes[side as usize]))?;
+        }
+        Ok(known)
     }
 
     /// True where both are.

@@ -7,7 +7,7 @@ use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
 use crate::stereo::select::stated_uncertainty::step;
-use crate::stereo::{Error, Side};
+use crate::stereo::{Camera, Error, Side};
 
 /// Another day's pictures of the same rig.
 fn known(seed: u64) -> KnownLenses {
@@ -80,7 +80,12 @@ fn a_lens_without_covariance_is_known_to_a_tolerance_and_one_side_may_be_open() 
     let mut corners = world.corners(72);
     corners.left_size.0 += 1;
     let known = KnownLenses::of_cameras([Some(camera), None]);
-    assert!(matches!(known.check_size(&corners), Err(Error::PictureSize { side: Side::Left, .. })));
+    assert!(matches!(known.of_pictures(&corners), Err(Error::PictureSize { side: Side::Left, .. })));
+    // Where its file says none, it is that of the pictures.
+    let of_none = KnownLenses::of_cameras([Some(Camera { width: 0, height: 0, ..camera }), None]);
+    let known = of_none.of_pictures(&world.corners(72)).unwrap();
+    let (as_said, taken) = (KnownLenses::of_cameras([Some(camera), None]), known.camera(Side::Left));
+    assert!(taken == Some(&camera) && known.covariance() == as_said.covariance());
 }
 
 #[test]
