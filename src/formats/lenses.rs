@@ -48,6 +48,10 @@ pub fn read(named: &[LensFile]) -> Result<Option<KnownLenses>> {
 const AS_TEXT: &str = "write it as text: `f = cv2.FileStorage('left.yml', cv2.FILE_STORAGE_WRITE)`, then `f.write(name, value)` of image_width, \
                        image_height, camera_matrix and distortion_coefficients, and `f.release()`";
 
+/// The names by which lenses are read.
+const NAMES: &str = "of OpenCV these are `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (of two cameras `M1 D1 M2 D2`), in \
+                     YAML, JSON or XML; files of ROS, Kalibr and mrcal are read as they are, and a calibration.json of `stereocal camera-check`";
+
 const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
 
 fn read_one(file: &LensFile) -> Result<KnownLenses> {
@@ -67,6 +71,9 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
             return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| asked(of).then_some(both[of as usize]))));
         }
         _ => {}
+    }
+    if in_file.is_none() && export::read(path, &text).is_none() && !text.contains("right_from_left") {
+        return Err(refused("no lens by the names that are read".to_owned(), NAMES));
     }
     let read = calibration::read(path).map_err(|error| match (error, in_file) {
         (files::Error::Format { message, hint: None, .. }, Some(_)) => refused(

@@ -45,7 +45,8 @@ pub fn files(rig: &Rig) -> Result<Vec<ExportedFile>, Error> {
 
 /// Reads the same back.
 pub fn read(text: &str) -> Result<Rig, String> {
-    let [left, right] = cameras::two(text).ok_or("no `M1`, `D1`, `M2` and `D2`")??;
+    let [left, right] =
+        cameras::two(text).ok_or("no two cameras by names that are read: `M1 D1 M2 D2`, with `R` and `T`")??;
     if left.width == 0 {
         return Err("no `image_width` and `image_height`: add both lines, the size of the pictures".to_owned());
     }

@@ -85,22 +85,13 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             open = (!unexplained && now.fitted < IMPLAUSIBLE_MM).then(|| best.open());
             break;
         }
-        let Likeliest { there, hypothesis, like, .. } = best;
-        let same: Vec<String> =
-            like.iter().map(|h| format!(", or, which these readings do not tell apart, {}", h.name())).collect();
+        let Likeliest { there, hypothesis, .. } = best;
         let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
-        let (whose, from, to) = there.fallen(&now, hypothesis.factor());
         let typed = set.typed_unit.filter(|_| hypothesis.factor() != 1.0);
         let list = if rows.is_empty() && typed.is_none() { &mut findings } else { &mut against };
-        let from = if from < 1.0 { format!("{from:.3}") } else { format!("{from:.2}") };
-        let says = typed.map_or_else(String::new, |unit| format!(" as `--units {}` says", unit.flag()));
-        let finding = Finding::new(
-            format!("{}{says}{} ({whose} fall from {from} to {to:.3} mm)", hypothesis.name(), same.concat()),
-            action(hypothesis, &like, typed),
-        );
-        list.push(Finding { of_joints: hypothesis.is_of_counting(), ..finding.about(rows) });
+        list.push(best.told(&now, typed).about(rows));
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
@@ -147,6 +138,21 @@ impl Likeliest {
         let rivals =
             of(&|other| !other.fits_like(&there) && is_near(other, EXPLAINS) && !there.is_nearer_in_all(other));
         Some(Likeliest { there, hypothesis, like, rivals })
+    }
+
+    /// What is said of it where errors were `now`, and where another unit was typed.
+    fn told(&self, now: &Misfit, typed: Option<Unit>) -> Finding {
+        let Likeliest { there, hypothesis, like, .. } = self;
+        let same: Vec<String> =
+            like.iter().map(|h| format!(", or, which these readings do not tell apart, {}", h.name())).collect();
+        let (whose, from, to) = there.fallen(now, hypothesis.factor());
+        let from = if from < 1.0 { format!("{from:.3}") } else { format!("{from:.2}") };
+        let says = typed.map_or_else(String::new, |unit| format!(" as `--units {}` says", unit.flag()));
+        let finding = Finding::new(
+            format!("{}{says}{} ({whose} fall from {from} to {to:.3} mm)", hypothesis.name(), same.concat()),
+            action(*hypothesis, like, typed),
+        );
+        Finding { of_joints: hypothesis.is_of_counting(), ..finding }
     }
 
     /// What is said of a table that several of them explain.

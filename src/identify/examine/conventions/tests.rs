@@ -293,3 +293,33 @@ fn of_two_robots_that_explain_about_as_well_neither_is_the_cause() {
     assert_eq!(best.rivals, [Hypothesis::Coupled(2, 1.0)]);
     assert!(best.open().finding.contains("joint 1 is counted the other way round"));
 }
+
+#[test]
+fn several_joints_that_are_counted_otherwise_at_once_are_named() {
+    let (world, rows) = near_the_axis(30.0);
+    let negated = |q: &mut Vec<f64>, which: &[usize]| which.iter().for_each(|joint| q[*joint] = -q[*joint]);
+    for (wrong, words) in [
+        // As KUKA counts, beside a textbook's table.
+        (joints(&rows, |q| negated(q, &[0, 3, 5])), &["joints 1, 4, 6 are counted the other way round"][..]),
+        (joints(&rows, |q| negated(q, &[1, 2, 4])), &["joints 2, 3, 5 are counted the other way round"]),
+        // As Fanuc does.
+        (
+            joints(&rows, |q| {
+                negated(q, &[2, 3, 4, 5]);
+                q[2] -= q[1];
+            }),
+            &["joints 3, 4, 5, 6 are counted the other way round", "joint 3 is counted together with joint 2"],
+        ),
+    ] {
+        let said = said(&wrong, &world.nominal);
+        assert!(said.len() == 1 && words.iter().all(|word| said[0].contains(word)), "{words:?}: {said:?}");
+    }
+    // Another arm is not counted so.
+    let mut robot = Robot::paper();
+    for (i, joint) in robot.joints.iter_mut().enumerate() {
+        joint.a_mm += 150.0 * (1.0 + 2.0 * i as f64).sin();
+        joint.alpha_rad += 0.5 * (2.0 + i as f64).cos();
+    }
+    let said = said(&rows, &robot);
+    assert!(said.iter().all(|said| !said.contains("joints")), "{said:?}");
+}
