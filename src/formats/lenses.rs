@@ -50,7 +50,7 @@ const AS_TEXT: &str = "write it as text: `f = cv2.FileStorage('left.yml', cv2.FI
 
 /// The names by which lenses are read.
 const NAMES: &str = "of OpenCV these are `camera_matrix`, `distortion_coefficients`, `image_width` and `image_height` (of two cameras `M1 D1 M2 D2`), in \
-                     YAML, JSON or XML; files of ROS, Kalibr and mrcal are read as they are, and a calibration.json of `stereocal camera-check`";
+                     YAML, JSON or XML; files of ROS, Kalibr, mrcal, camodocal and a project of calib.io are read as they are, and a calibration.json of `stereocal camera-check`";
 
 const HINT: &str = "`--intrinsics FILE` takes a calibration.json of `stereocal camera-check`, or a file of OpenCV, ROS, Kalibr or mrcal";
 

@@ -1,7 +1,7 @@
 //! The lenses in a file of one camera or of two, by the names that programs and people give them.
 //!
-//! In: the text of a file of OpenCV's FileStorage (YAML, JSON, or XML as [`as_yaml`] has it), of a ROS message, or as
-//! people write it. Out: its cameras; how they stand to each other is not asked. A file that says no size (OpenCV's
+//! In: the text of a file of OpenCV's FileStorage (YAML, JSON, or XML as [`as_yaml`] has it), of a ROS message, of
+//! camodocal (a pinhole), of calib.io's Calibrator (a project), or as people write it. Out: its cameras; how they stand to each other is not asked. A file that says no size (OpenCV's
 //! stereo sample writes none) gives cameras of none, width and height zero: theirs is that of the pictures. Lenses of
 //! another model than OpenCV's (fisheye, omnidirectional) are refused by what the file calls them, and by a matrix
 //! with a skew. Goes wrong: a file of another model that says so nowhere.
@@ -10,6 +10,7 @@ use std::borrow::Cow;
 use std::fmt::Write;
 
 use roxmltree::{Document, Node};
+use serde_json::Value;
 
 use super::scan::{behind, list, number};
 use crate::formats::checked;
@@ -45,6 +46,12 @@ pub enum Cameras {
 
 /// The cameras of a file; `None` where it holds none by these names.
 pub fn read(text: &str) -> Option<Result<Cameras, String>> {
+    if text.contains("libCalib::CameraModel") {
+        return Some(of_calibrator(text));
+    }
+    if stands(text, "projection_parameters") && stands(text, "distortion_parameters") {
+        return Some(of_camodocal(text).map(Cameras::One));
+    }
     let has = |(matrix, lens): &(&str, &str)| stands(text, matrix) && stands(text, lens);
     if let Some((matrix, lens)) = ONE.iter().find(|names| has(names)) {
         return Some(one(text, size(text, ""), matrix, lens).map(Cameras::One));
@@ -86,6 +93,52 @@ fn one(text: &str, size: Option<(f64, f64)>, matrix: &str, distortion: &str) -> 
     let lens = checked::lens_of_length(coefficients.len())?;
     let camera = checked::camera(size.unwrap_or((1.0, 1.0)), &pinhole, lens, &coefficients)?;
     Ok(if size.is_some() { camera } else { Camera { width: 0, height: 0, ..camera } })
+}
+
+/// The coefficients of OpenCV's vector, in its order.
+const OF_OPENCV: [&str; 14] = ["k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tauX", "tauY"];
+
+/// The pinhole of camodocal, which writes each number by its own name.
+fn of_camodocal(text: &str) -> Result<Camera, String> {
+    of_opencv(text)?;
+    let size = size(text, "").ok_or("no `image_width` and `image_height`: add both lines, the size of the pictures")?;
+    let all = |names: &[&str]| names.iter().map(|name| number(text, name)).collect::<Result<Vec<f64>, String>>();
+    let coefficients = all(&OF_OPENCV[..4])?;
+    checked::camera(size, &all(&["fx", "fy", "cx", "cy"])?, checked::lens_of_length(4)?, &coefficients)
+}
+
+/// The cameras of a project of calib.io's Calibrator, of its model of OpenCV's lens.
+fn of_calibrator(text: &str) -> Result<Cameras, String> {
+    let project: Value = serde_json::from_str(text).map_err(|error| format!("no project of calib.io: {error}"))?;
+    let cameras = project["Calibration"]["cameras"].as_array().map_or(&[][..], Vec::as_slice);
+    let one = |camera: &Value| {
+        let model = &camera["model"];
+        let name = model["polymorphic_name"].as_str().unwrap_or("without a name");
+        if name != "libCalib::CameraModelOpenCV" {
+            return Err(format!("a camera's model is {name}; libCalib::CameraModelOpenCV is read"));
+        }
+        let data = &model["ptr_wrapper"]["data"];
+        let size = &data["CameraModelCRT"]["CameraModelBase"]["imageSize"];
+        let side = |key: &str| size[key].as_f64().ok_or_else(|| format!("no `imageSize` with a {key}"));
+        let value = |key: &str| {
+            let number = data["parameters"][key]["val"].as_f64();
+            number.ok_or_else(|| format!("no parameter `{key}` of a camera"))
+        };
+        // Which of both focal lengths it multiplies the file does not say.
+        if (value("ar")? - 1.0).abs() > 1e-9 {
+            return Err("`ar` is not 1: cameras of pixels that are not square are not read".to_owned());
+        }
+        let pinhole = [value("f")?, value("f")?, value("cx")?, value("cy")?];
+        let mut lens = OF_OPENCV.iter().map(|key| value(key)).collect::<Result<Vec<f64>, String>>()?;
+        let used = lens.iter().rposition(|number| *number != 0.0).map_or(0, |last| last + 1);
+        lens.truncate([4, 5, 8, 12, 14].into_iter().find(|count| *count >= used).unwrap_or(14));
+        checked::camera((side("width")?, side("height")?), &pinhole, checked::lens_of_length(lens.len())?, &lens)
+    };
+    match cameras {
+        [camera] => one(camera).map(Cameras::One),
+        [left, right] => Ok(Cameras::Two([one(left)?, one(right)?])),
+        others => Err(format!("the project holds {} cameras; one or two are read", others.len())),
+    }
 }
 
 /// `fx fy cx cy` of a camera matrix that stands row by row; the reason where it is none, or has a skew.
@@ -160,6 +213,7 @@ pub(super) fn as_yaml(text: &str) -> Cow<'_, str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stereo::Lens;
 
     const K: &str = "[ 800., 0., 320., 0., 801., 240., 0., 0., 1. ]";
 
@@ -192,6 +246,36 @@ mod tests {
                        distortion_model: plumb_bob\nheight: 480\nroi:\n  height: 0\n  width: 0\nwidth: 640\n";
         let camera = only(message);
         assert_eq!((camera.width, camera.height, camera.fy), (640, 480, 801.0));
+    }
+
+    #[test]
+    fn pinholes_of_camodocal_and_projects_of_the_calibrator_are_read() {
+        let pinhole = "model_type: PINHOLE\nimage_width: 640\nimage_height: 480\ndistortion_parameters:\n   k1: 0.1\n   k2: -0.2\n   \
+                       p1: 0.001\n   p2: 0.002\nprojection_parameters:\n   fx: 800.\n   fy: 801.\n   cx: 320.\n   cy: 240.\n";
+        let camera = only(pinhole);
+        assert_eq!((camera.width, camera.fy, camera.distortion[3]), (640, 801.0, 0.002));
+        let omni = pinhole.replace("PINHOLE", "MEI");
+        assert!(matches!(read(&omni), Some(Err(why)) if why.contains("another model")));
+
+        let of = |k3: f64, ar: f64| {
+            let named: Vec<String> = OF_OPENCV
+                .iter()
+                .map(|key| format!("\"{key}\": {{\"val\": {}}}", if *key == "k3" { k3 } else { 0.0 }))
+                .collect();
+            format!(
+                "{{\"model\": {{\"polymorphic_name\": \"libCalib::CameraModelOpenCV\", \"ptr_wrapper\": {{\"data\": {{\"CameraModelCRT\": {{\"CameraModelBase\": \
+                 {{\"imageSize\": {{\"width\": 640, \"height\": 480}}}}}}, \"parameters\": {{\"f\": {{\"val\": 800}}, \"ar\": {{\"val\": {ar}}}, \"cx\": {{\"val\": 320}}, \
+                 \"cy\": {{\"val\": 240}}, {}}}}}}}}}}}",
+                named.join(", ")
+            )
+        };
+        let project = |cameras: &[String]| format!("{{\"Calibration\": {{\"cameras\": [{}]}}}}", cameras.join(", "));
+        let two = read(&project(&[of(0.3, 1.0), of(0.0, 1.0)]));
+        let Some(Ok(Cameras::Two([left, right]))) = two else { panic!("{two:?}") };
+        assert_eq!((left.fy, left.lens, left.distortion[4]), (800.0, Lens::Brown5, 0.3));
+        assert_eq!((right.lens, right.height), (Lens::Brown4, 480));
+        assert!(matches!(read(&project(&[of(0.3, 1.2)])), Some(Err(why)) if why.contains("not square")));
+        assert!(matches!(read(&project(&[])), Some(Err(why)) if why.contains("0 cameras")));
     }
 
     #[test]
