@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use super::hypothesis::{Counting, Hypothesis, still};
 use super::in_hand::most_points;
 use super::misfit::EXPLAINS;
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::robot::Robot;
-use crate::robot::tool_fit::Start;
+use crate::robot::tool_fit::{POSES, Start};
 
 /// Fewest poses: nine unknowns and as many joints as arms have are held against 36 numbers.
 const FEWEST: usize = 12;
@@ -53,6 +54,14 @@ pub fn likeliest(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
         all.par_iter().filter(|counting| counting.is_of_several()).filter_map(|of| Some((left(*of)?, *of))).collect();
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(least) = tried.first().map(|(mm, _)| *mm).filter(|mm| NEARER * mm < now) else { return Vec::new() };
-    let near = tried.into_iter().take_while(|(mm, _)| *mm < EXPLAINS * least).take(FITTED);
-    near.map(|(_, counting)| Hypothesis::Counted(counting)).collect()
+    let near: Vec<(f64, Counting)> = tried.into_iter().take_while(|(mm, _)| *mm < EXPLAINS * least).collect();
+    // A change of which the points do not tell is none, by the likelihood of what the file's robot leaves: a row counts
+    // once.
+    let is_told = |(mm, own): &&(f64, Counting)| {
+        near.iter().filter(|(_, other)| other.is_part_of(own)).all(|(of_part, _)| {
+            let rows = points.len().min(POSES) as f64;
+            rows * (of_part / mm).ln() > TOLD_APART
+        })
+    };
+    near.iter().filter(is_told).take(FITTED).map(|(_, counting)| Hypothesis::Counted(*counting)).collect()
 }

@@ -56,6 +56,12 @@ impl Counting {
         self.negated.count_ones() + u32::from(self.coupled.is_some()) > 1
     }
 
+    /// Whether the other changes all of this, and more.
+    pub fn is_part_of(&self, other: &Counting) -> bool {
+        let is_coupled_alike = self.coupled.is_none() || self.coupled == other.coupled;
+        self != other && self.negated & !other.negated == 0 && is_coupled_alike
+    }
+
     /// The joints that are counted the other way round.
     fn negated(&self) -> Vec<usize> {
         (0..u32::BITS as usize).filter(|joint| self.negated >> joint & 1 == 1).collect()
