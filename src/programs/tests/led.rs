@@ -1,0 +1,70 @@
+//! What leads the arm or shifts its motions, and instructions that are not known: none of them is passed over.
+
+use super::{read, said};
+use crate::programs::*;
+
+const LED: &str = "follows a speed, a force or a sensor";
+const SHIFTED: &str = "adds an offset to its target";
+const UNKNOWN: &str = "is an instruction that is not known here";
+const ELSEWHERE: &str = "moves by values that are not numbers in this file";
+
+#[test]
+fn yaskawa() {
+    let job = |lines: &str| {
+        format!(
+            "/JOB\n//NAME SEAM\n//POS\n///NPOS 2,0,0,0,0,0\n///TOOL 0\n///POSTYPE ANGLE\n///ANGLE\nC00000=5,-10,20,0,40,7\n\
+             C00001=6,-12,24,1,42,8\n//INST\n///DATE 2024/02/01 10:00\n///ATTR SC,RW\n///GROUP1 RB1\nNOP\n{lines}END\n"
+        )
+    };
+    // What is known to move nothing, with conditions, labels, remarks and blanks.
+    let clean = job(
+        "*START\n'FORMCUT FCF#(1)\n\tMOVJ C00000 VJ=10.00 UNTIL IN#(1)=ON\nDOUT OT#(4) ON IF B001=2\nJUMP *START IF IN#(2)=OFF\n\
+                     MEMON REC MPF#(2)\nMOVL C00001 V=20.0\nMEMOF\nWVON WEV#(1)\nMOVL C00000 V=10.0\nWVOF\nMACRO7 MJ#(7) ARGF1\nREFP 1 C00000\n\x1a\n",
+    );
+    assert_eq!(said(Language::Jbi, &clean), ["17 MOVJ: C00000", "21 MOVL: C00001", "24 MOVL: C00000"]);
+    for (begin, end, cause) in [
+        ("COMARCON AMP=2.0", "COMARCOF", LED),
+        ("FLOATON FL#(3)", "FLOATOF", LED),
+        ("IMPON RB1 X=1", "IMPOF", LED),
+        ("MEMON PLY MPF#(2)", "MEMOF", LED),
+    ] {
+        let (word, target) = begin.split_once(' ').unwrap();
+        let text = job(&format!("{begin}\nMOVL C00000 V=9.0\n{end}\nMOVJ C00001 VJ=3.00\n"));
+        let target = target.split(' ').next().unwrap();
+        let expected = [
+            format!("line 15: {word} {target} {cause}"),
+            format!("line 16: MOVL C00000 {cause}"),
+            "18 MOVJ: C00001".to_owned(),
+        ];
+        assert_eq!(said(Language::Jbi, &text), expected);
+    }
+    let text = job(
+        "SFTON P003 UF#(1)\nMOVL C00000 V=9.0\nSFTOF\nFORMCUT FCF#(4)\nGLIDETO C00001 SLOW\nMOVJ C00001 VJ=3.00\nMOVJ\n",
+    );
+    let expected = [
+        format!("line 16: MOVL C00000 {SHIFTED}"),
+        format!("line 18: FORMCUT FCF#(4) {ELSEWHERE}"),
+        format!("line 19: GLIDETO C00001 {UNKNOWN}"),
+        "20 MOVJ: C00001".to_owned(),
+        format!("line 21: MOVJ {ELSEWHERE}"),
+    ];
+    assert_eq!(said(Language::Jbi, &text), expected);
+}
+
+/// Jobs of a few lines have no `///POSTYPE`.
+#[test]
+fn yaskawa_without_types() {
+    let joints = Joints { slides: &[false; 6], pulses_per_deg: &[1000.0; 6] };
+    let job = |heading: &str, place: &str| {
+        format!("/JOB\n//POS\n///NPOS 1,0,0,0,0,0\n{heading}C00000={place}\n//INST\nNOP\nMOVJ C00000 VJ=1.0\nEND\n")
+    };
+    for heading in ["///PULSE\n", ""] {
+        let program = Program::read(Language::Jbi, &job(heading, "4000,-5000,6000,0,7000,-8000"), joints).unwrap();
+        assert_eq!(program.targets[0].readings, [4.0, -5.0, 6.0, 0.0, 7.0, -8.0]);
+        assert_eq!(program.motions[0].moves_by, Ok(vec![0]));
+    }
+    for (heading, cause) in [("///RECTAN\n", Cause::Cartesian), ("", Cause::Untyped)] {
+        let program = Program::read(Language::Jbi, &job(heading, "400.0,-50.0,60.0,0.0,70.0,-80.0"), joints).unwrap();
+        assert!(program.targets.is_empty() && program.motions[0].moves_by == Err(cause), "{heading}");
+    }
+}
