@@ -1,6 +1,6 @@
 //! What leads the arm or shifts its motions, and instructions that are not known: none of them is passed over.
 
-use super::{read, said};
+use super::said;
 use crate::programs::*;
 
 const LED: &str = "follows a speed, a force or a sensor";
@@ -67,4 +67,42 @@ fn yaskawa_without_types() {
         let program = Program::read(Language::Jbi, &job(heading, "400.0,-50.0,60.0,0.0,70.0,-80.0"), joints).unwrap();
         assert!(program.targets.is_empty() && program.motions[0].moves_by == Err(cause), "{heading}");
     }
+}
+
+#[test]
+fn fanuc() {
+    let position = |n: u32| {
+        format!(
+            "P[{n}]{{\n   GP1:\n  UF : 0, UT : 1,\n  J1= {n} deg, J2= 2 deg, J3= 3 deg,\n  J4= 4 deg, J5= 5 deg, J6= 6 deg\n}};\n"
+        )
+    };
+    let listing = |lines: &str| format!("/PROG  SEAM\n/MN\n{lines}/POS\n{}{}/END\n", position(1), position(2));
+    for (begin, end, cause) in [
+        ("Touch Offset PR[3]", "Touch Offset End", SHIFTED),
+        ("MP Offset PR[3] RPM[1]", "MP Offset End", SHIFTED),
+        ("Track TAST[2]", "Track End", LED),
+        ("SOFTFLOAT[4]", "SOFTFLOAT END", LED),
+        ("SOFTFLOAT ON", "SOFTFLOAT OFF", LED),
+    ] {
+        let text = listing(&format!(
+            "   1:J P[1] 100% FINE    ;\n   2:  {begin} ;\n   3:L P[2:\"seam\"] 9mm/sec FINE    ;\n   4:  {end} ;\n   5:J P[1] 50% FINE    ;\n"
+        ));
+        let said = said(Language::FanucLs, &text);
+        let (motions, led): (Vec<_>, Vec<_>) = said
+            .iter()
+            .cloned()
+            .partition(|line| ["3 J", "line 5: L", "7 J"].iter().any(|head| line.starts_with(head)));
+        let of_position = |cause: &str| format!("line 5: L P[2:\"seam\"] {cause}");
+        assert_eq!(motions, ["3 J: P[1]".to_owned(), of_position(cause), "7 J: P[1]".to_owned()]);
+        let word = begin.split(['[', ' ']).next().unwrap();
+        let expected: Vec<String> = (cause == LED).then(|| format!("line 4: {word} {cause}")).into_iter().collect();
+        assert_eq!(led, expected);
+    }
+    let text = listing("   1:  OFFSET CONDITION PR[3]    ;\n   2:J P[1] 100% FINE    ;\n   3:  FORCE CTRL[2] ;\n");
+    assert_eq!(said(Language::FanucLs, &text), ["4 J: P[1]".to_owned(), format!("line 5: FORCE CTRL {LED}")]);
+    let text = listing("   1:J P[1] 100% FINE    ;\n   2:J P[2] 100% FINE    \n");
+    assert_eq!(
+        said(Language::FanucLs, &text),
+        ["3 J: P[1]", "line 4: J P[2] has no `;` at its end: is the file cut off?"]
+    );
 }
