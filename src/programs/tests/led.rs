@@ -106,3 +106,58 @@ fn fanuc() {
         ["3 J: P[1]", "line 4: J P[2] has no `;` at its end: is the file cut off?"]
     );
 }
+
+#[test]
+fn rapid() {
+    let module = |lines: &str| {
+        format!(
+            "MODULE cell\nCONST jointtarget jDock:=[[5,-10,20,0,40,7],[9E9,9E9,9E9,9E9,9E9,9E9]];\n\
+             CONST jointtarget jRack:=[[6,-12,24,1,42,8],[9E9,9E9,9E9,9E9,9E9,9E9]];\n\
+             CONST robtarget pPart:=[[500,0,400],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\n\
+             MoveAbsJ jDock,vSlow,fine,tGrip;\n{lines}ENDPROC\nPROC Visit(jointtarget jTo)\nENDPROC\nENDMODULE\n"
+        )
+    };
+    let clean = "Visit jRack;\nDockIt jDock;\nVisit Offs(pPart,0,0,9);\nTPWrite \"at\" + ValToStr(jRack);\nWaitTime 1;\nReset doLamp;\n\
+                 jLast:=jRack;\nRETURN jRack;\nBlink 5, \\Fast;\nBlink;\nMoveLamp 3;\nIF jDock=jRack Blink;\nVAR robtarget pNow;\n\
+                 UseNumber pPart.trans.x;\nPDispOn pPart, tGrip;\nWZHomeJointDef \\Inside, wz, jRack, jSpan;\nx:=known(jRack);\n\
+                 ! BEUpdateTcp tGrip;\n";
+    assert_eq!(said(Language::Rapid, &module(clean)), ["6 MoveAbsJ: jDock"]);
+    for (statement, expected) in [
+        ("BEUpdateTcp tGrip\\XYZOnly;", format!("BEUpdateTcp tGrip {ELSEWHERE}")),
+        ("PathRecMoveBwd;", format!("PathRecMoveBwd {ELSEWHERE}")),
+        ("LoadId TOOL_LOAD_ID, WRIST, tGrip;", format!("LoadId TOOL_LOAD_ID {ELSEWHERE}")),
+        ("MovePose pPark;", format!("MovePose pPark {UNKNOWN}")),
+        ("DockIt jRack;", format!("DockIt jRack {UNKNOWN}")),
+        (
+            "DockIt [[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]];",
+            format!("DockIt [[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]] {UNKNOWN}"),
+        ),
+        ("IF bOk THEN DockIt \\Fast, jRack; ENDIF", format!("DockIt jRack {UNKNOWN}")),
+        ("TEST n CASE 1,2: DockIt 4, pPart;", format!("DockIt 4 {UNKNOWN}")),
+        ("DockIt 4 \\To:=jRack, vSlow;", format!("DockIt 4 {UNKNOWN}")),
+        ("DockIt Offs(pPart,0,0,9);", format!("DockIt Offs(pPart,0,0,9) {UNKNOWN}")),
+        ("MyMoveJ jRack,vSlow,zNear,tGrip;", format!("MyMoveJ jRack {UNKNOWN}")),
+        ("Visit jDock, v100;", format!("Visit jDock {ELSEWHERE}")),
+        ("SoftAct 3, 20;", format!("SoftAct 3 {LED}")),
+        ("ArcMoveL pPart,vSlow,zNear,tGrip;", "ArcMoveL pPart is Cartesian".to_owned()),
+    ] {
+        let expected = format!("line 7: {expected}");
+        assert_eq!(
+            said(Language::Rapid, &module(&format!("{statement}\n"))),
+            ["6 MoveAbsJ: jDock".to_owned(), expected]
+        );
+    }
+    let arc = module("ArcMoveAbsJ [[1,2,3,4,5,6],[9E9,9E9,9E9,9E9,9E9,9E9]], vSlow, zNear, tGrip;\n");
+    assert_eq!(said(Language::Rapid, &arc), ["6 MoveAbsJ: jDock", "7 ArcMoveAbsJ: line 7"]);
+    // Without its end, at the end and before another one.
+    let unended = "has no `;` at its end: is the file cut off?";
+    let text =
+        module("MoveAbsJ jRack,vSlow,fine,tGrip\nMoveAbsJ jDock,vSlow,fine,tGrip;\nMoveAbsJ jRack,vSlow,fine,tGrip\n");
+    let expected = [
+        "6 MoveAbsJ: jDock".to_owned(),
+        format!("line 7: MoveAbsJ jRack {unended}"),
+        "8 MoveAbsJ: jDock".to_owned(),
+        format!("line 9: MoveAbsJ jRack {unended}"),
+    ];
+    assert_eq!(said(Language::Rapid, &text), expected);
+}

@@ -57,7 +57,7 @@ ENDMODULE
         "line 26: TriggL p10 is Cartesian".to_owned(),
         "line 27: ArcL p10 is Cartesian".to_owned(),
         "line 28: MoveExtJ jHome moves external axes".to_owned(),
-        format!("line 29: CutAlong p10 {ELSEWHERE}"),
+        "line 29: CutAlong p10 is an instruction that is not known here".to_owned(),
         format!("line 31: MoveAbsJ jOther {ELSEWHERE}"),
         format!("line 33: MoveAbsJ jTo {ELSEWHERE}"),
     ];
