@@ -1,5 +1,9 @@
 //! KUKA's language: `{A1 .., A2 .., ..}`, deg.
+//!
+//! In: the text of a program, with that of its data file behind it. Out: its joint targets, and its instructions that
+//! move. What goes wrong: points that neither declares.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use crate::programs::handed::{self, Calls};
@@ -18,6 +22,11 @@ const RELATIVE: [&str; 7] = ["PTP_REL", "LIN_REL", "CIRC_REL", "SPTP_REL", "SLIN
 const RECORDED: &str = "MOVE_EMI";
 /// What moves nothing: a motion to where the robot stands.
 const HERE: [&str; 2] = ["$AXIS_ACT", "$POS_ACT"];
+
+/// Types of points, and whether these are poses.
+const TYPES: [(&str, bool); 5] = [("FRAME", true), ("POS", true), ("E6POS", true), ("AXIS", false), ("E6AXIS", false)];
+/// How variables of the controller begin.
+const OF_CONTROLLER: char = '$';
 
 /// Functions that leave what they are given as it is.
 const READING: &str = "BAS INV_POS FORWARD VARSTATE ABS SWRITE CWRITE EKI_SetReal EKI_SetFrame EKI_SetInt SQRT";
@@ -74,6 +83,7 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
 pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     let code = scan::code(text, ";");
     let variables = Variables::read(&code, SYNTAX, targets);
+    let types = types(&code);
     let mut found = Vec::new();
     let mut last = "";
     for word in scan::words(&code) {
@@ -95,7 +105,9 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             continue;
         }
         let moves_by = match () {
-            () if of(&EITHER) => variables.expression(&code, at.clone(), targets),
+            () if of(&EITHER) => variables.expression(&code, at.clone(), targets).map_err(|cause| {
+                if cause == Cause::Elsewhere { why(&code[at.clone()], &variables, &types) } else { cause }
+            }),
             () if of(&CARTESIAN) => Err(Cause::Cartesian),
             () if of(&RELATIVE) => Err(Cause::Offset),
             () if name == RECORDED => Err(Cause::Elsewhere),
@@ -104,6 +116,34 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
         found.push(Instruction::new(text, word, at, moves_by));
     }
     found
+}
+
+/// Why a point has no numbers here, by what declares it, or that nothing does.
+fn why(point: &str, variables: &Variables, types: &BTreeMap<String, bool>) -> Cause {
+    let Some(first) = scan::words(point).next().filter(|word| word.start == 0) else { return Cause::Elsewhere };
+    let (name, behind) = (&point[first.clone()], point[first.end..].trim_start());
+    let is_variable =
+        scan::is_name(name) && !name.starts_with(OF_CONTROLLER) && (behind.is_empty() || behind.starts_with('['));
+    match types.get(&name.to_ascii_uppercase()) {
+        _ if !is_variable => Cause::Elsewhere,
+        Some(true) => Cause::Cartesian,
+        None if !variables.knows(name) => Cause::Undeclared,
+        _ => Cause::Elsewhere,
+    }
+}
+
+/// Variables of points as they are declared, in capitals, and whether they hold poses.
+fn types(code: &str) -> BTreeMap<String, bool> {
+    let declared = |word: std::ops::Range<usize>| {
+        let (_, poses) = TYPES.iter().find(|(name, _)| name.eq_ignore_ascii_case(&code[word.clone()]))?;
+        let end = code[word.end..].find('\n').map_or(code.len(), |length| word.end + length);
+        let names = scan::parts(code, word.end..end).into_iter().filter_map(|part| {
+            let first = scan::words(&code[part.clone()]).next().filter(|w| w.start == 0)?;
+            Some(code[part.start..part.start + first.end].to_ascii_uppercase())
+        });
+        Some(names.map(|name| (name, *poses)).collect::<Vec<_>>())
+    };
+    scan::words(code).filter_map(declared).flatten().collect()
 }
 
 /// The first point behind a word, without the blending and the settings behind it.

@@ -161,3 +161,41 @@ fn rapid() {
     ];
     assert_eq!(said(Language::Rapid, &text), expected);
 }
+
+#[test]
+fn urscript() {
+    let script = |lines: &str| {
+        format!(
+            "def cell():\n  dock=[0.1,-1.2,0.9,-0.4,1.5,0.2]\n  rack=[0.2,-1.2,0.9,-0.4,1.5,0.2]\n  part=p[0.4,-0.2,0.3,0,3.1,0]\n  def visit(q):\n    \
+             movej(dock)\n  end\n{lines}end\n"
+        )
+    };
+    let clean = "  visit(rack)\n  fetch(dock)\n  if (dock == rack):\n    n=norm(rack)\n  end\n  pose=get_forward_kin(rack)\n  cam.send(rack)\n  grip_move(200)\n  \
+                 place(part)\n";
+    assert_eq!(said(Language::UrScript, &script(clean)), ["6 movej: dock"]);
+    for (call, target) in [
+        ("fetch(rack)", "rack"),
+        ("fetch(1, to=rack)", "1"),
+        ("fetch([0,-1,1,0,1,0])", "[0,-1,1,0,1,0]"),
+        ("lift_move(part)", "part"),
+    ] {
+        let expected = format!("line 8: {} {target} {UNKNOWN}", call.split('(').next().unwrap());
+        assert_eq!(said(Language::UrScript, &script(&format!("  {call}\n"))), ["6 movej: dock".to_owned(), expected]);
+    }
+}
+
+/// Points by what declares them, where no numbers are.
+#[test]
+fn krl() {
+    let text = "DEF a( )\nDECL E6POS VIA[2], LAST\nDECL E6AXIS REST\nPTP VIA[1]\nVIA[1].Z = H + 20\nPTP LAST\nPTP REST\nPTP XDOCK\nPTP NEAR\n\
+                PTP $POS_RET\nNEAR = LAST\nEND\nDEFDAT a\nVIA[1]={X 1,Y 2,Z 3,A 4,B 5,C 6}\nENDDAT\n";
+    let expected = [
+        "line 4: PTP VIA[1] is Cartesian".to_owned(),
+        "line 6: PTP LAST is Cartesian".to_owned(),
+        format!("line 7: PTP REST {ELSEWHERE}"),
+        "line 8: PTP XDOCK goes to a point that is declared in none of the files read".to_owned(),
+        format!("line 9: PTP NEAR {ELSEWHERE}"),
+        format!("line 10: PTP $POS_RET {ELSEWHERE}"),
+    ];
+    assert_eq!(said(Language::Krl, text), expected);
+}
