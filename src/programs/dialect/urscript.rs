@@ -1,7 +1,8 @@
 //! Universal Robots' language: lists of angles in rad.
 //!
 //! In: the text of a script. Out: its lists of joint angles, and its calls that move; among them those of functions of
-//! other files that get joint angles which no motion of this one has. What goes wrong: angles that are computed at run time.
+//! other files that get joint angles which no motion of this one has. What goes wrong: angles that are computed at run
+//! time.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

@@ -162,8 +162,8 @@ fn kind(word: &str) -> Option<Result<(), Cause>> {
     })
 }
 
-/// Whether an instruction is none of those that are known to move nothing. Other lines are a remark, a label, a heading or
-/// a position.
+/// Whether an instruction is none of those that are known to move nothing. Other lines are a remark, a label, a heading
+/// or a position.
 fn is_unknown(word: &str) -> bool {
     let number = word.strip_prefix(MACRO).unwrap_or("-");
     word.starts_with(|c: char| c.is_ascii_alphabetic())
