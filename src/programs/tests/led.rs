@@ -198,4 +198,24 @@ fn krl() {
         format!("line 10: PTP $POS_RET {ELSEWHERE}"),
     ];
     assert_eq!(said(Language::Krl, text), expected);
+    // Routines of other files.
+    let text = |call: &str| {
+        format!(
+            "DEF a( )\nDECL E6AXIS DOCK, RACK\nDECL E6POS PART\nDOCK={{A1 5,A2 -90,A3 90,A4 0,A5 40,A6 7}}\nRACK={{A1 6,A2 -90,A3 90,A4 0,A5 40,A6 7}}\n\
+             PTP DOCK\n{call}\nEND\nDEF own(P :IN)\nEND\n"
+        )
+    };
+    for clean in
+        ["own(RACK)", "P = FORWARD(RACK, ERR)", "lamp(3)", "place(PART)", "IF (RACK.A1 > 0) THEN", "show(RACK.A1)"]
+    {
+        assert_eq!(said(Language::Krl, &text(clean)), ["6 PTP: DOCK"], "{clean}");
+    }
+    for (call, target) in
+        [("fetch(3, RACK)", "RACK"), ("fetch({A1 1,A2 2,A3 3,A4 4,A5 5,A6 6})", "{A1 1,A2 2,A3 3,A4 4,A5 5,A6 6}")]
+    {
+        assert_eq!(
+            said(Language::Krl, &text(call)),
+            ["6 PTP: DOCK".to_owned(), format!("line 7: fetch {target} {UNKNOWN}")]
+        );
+    }
 }
