@@ -132,8 +132,8 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     found
 }
 
-/// Of these calls, those of routines that this file does not hold and that get axis values which are not corrected where
-/// they stand, each with its first argument of that kind.
+/// Of these calls, those of routines that this file does not hold and that get axis values which are not corrected
+/// where they stand, each with its first argument of that kind.
 fn others(
     code: &str,
     calls: Vec<Range<usize>>,
