@@ -30,7 +30,7 @@ const PATHS: [(&str, Cause); 5] = [
     ("mc_run_motion", Cause::Elsewhere),
 ];
 /// Functions of the language that take lists of a joint's numbers, and move nothing; and words that are no calls.
-const STILL: &str = "if elif while and or not xor return get_forward_kin get_inverse_kin_has_solution get_inverse_kin_qnear \
+const STILL: &str = "if elif while and or not xor return struct get_forward_kin get_inverse_kin_has_solution get_inverse_kin_qnear \
     is_within_safety_limits get_jacobian get_jacobian_time_derivative get_mass_matrix get_coriolis_and_centrifugal_torques \
     norm normalize length size get_list_length textmsg popup assert str_cat to_str to_num dot cross transpose inv wrench_trans \
     tool_contact set_target_payload set_payload force_mode_set_damping floor ceil sqrt socket_send_string socket_send_line \
