@@ -83,6 +83,8 @@ pub struct Compensator {
     nominal_tool: Transform,
     identified_tool: Transform,
     reach_mm: f64,
+    /// Whether readings were given in radians.
+    radians: bool,
 }
 
 impl Compensator {
@@ -99,7 +101,16 @@ impl Compensator {
         unlimited.joints.iter_mut().for_each(|joint| joint.limits_rad = None);
         let slides = identified.joints.iter().any(|j| j.slides);
         let reach_mm = if slides { f64::INFINITY } else { identified.reach_mm() };
-        Compensator { nominal, identified, unlimited, known: None, nominal_tool, identified_tool, reach_mm }
+        Compensator {
+            nominal,
+            identified,
+            unlimited,
+            known: None,
+            nominal_tool,
+            identified_tool,
+            reach_mm,
+            radians: false,
+        }
     }
 
     /// The same that takes, for poses without readings, postures within these ranges, rad (mm), where there are any:
@@ -113,6 +124,12 @@ impl Compensator {
         let ranges: Vec<(f64, f64)> = self.identified.joints.iter().zip(ranges).map(both).collect();
         self.known = Some(self.identified.within(&ranges));
         self
+    }
+
+    /// The same of targets that may have been given in radians: a reading far outside is asked whether it is degrees.
+    #[must_use]
+    pub fn given_in_radians(self, radians: bool) -> Compensator {
+        Compensator { radians, ..self }
     }
 
     /// Where the nominal robot's tool is, `root_from_tool`.
@@ -154,7 +171,9 @@ impl Compensator {
                 let meant = self.meant(given);
                 let there = self.reached(given);
                 let miss_mm = Some((meant.translation.vector - there.translation.vector).norm());
-                let outside = self.beyond(given, |joint, given, range| Refusal::Outside { joint, given, range });
+                let radians = self.radians;
+                let outside = |joint, given, range| Refusal::Outside { joint, given, range, radians };
+                let outside = self.beyond(given, outside);
                 let kept = || self.kept(&self.base_from_flange(&meant), given);
                 self.with_left(
                     Compensated { readings: outside.map_or_else(kept, Err), miss_mm, left_rad: None },

@@ -27,6 +27,8 @@ pub enum Refusal {
         given: f64,
         /// Its range.
         range: (f64, f64),
+        /// Whether the file it was given in holds radians.
+        radians: bool,
     },
     /// The correction would turn a joint far: the posture is next to a singular one.
     Singular {
@@ -51,10 +53,10 @@ impl std::fmt::Display for Refusal {
             Refusal::Limit { joint, needed, range: (low, high) } => {
                 write!(f, "joint {joint} would need {needed:.3}; its range is {low:.3} to {high:.3}")
             }
-            Refusal::Outside { joint, given, range: (low, high) } => {
+            Refusal::Outside { joint, given, range: (low, high), radians } => {
                 write!(f, "joint {joint} of the target is at {given:.3}; its range is {low:.3} to {high:.3}")?;
                 let as_degrees = given.to_radians();
-                if given.abs() > 360.0 && (*low..=*high).contains(&as_degrees) {
+                if *radians && given.abs() > 360.0 && (*low..=*high).contains(&as_degrees) {
                     write!(f, ": degrees, {as_degrees:.1}, where radians are read?")?;
                 }
                 Ok(())

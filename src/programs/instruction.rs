@@ -1,7 +1,5 @@
 //! The instructions of a program that move the robot, and what each of them moves by.
 
-use super::scan;
-
 /// Characters of an instruction's target that are quoted.
 const QUOTED: usize = 60;
 
@@ -14,6 +12,15 @@ pub enum Cause {
     /// Its joint values are computed or written at run time, or stand in another file, a register or a parameter.
     #[error("moves by values that are not numbers in this file")]
     Elsewhere,
+    /// Its target is a variable that nothing declares.
+    #[error("goes to a point that is declared in none of the files read")]
+    Undeclared,
+    /// Its position has no type.
+    #[error("goes to a position of which the file says neither that it is joints nor that it is Cartesian")]
+    Untyped,
+    /// What ends an instruction is missing behind it.
+    #[error("has no `;` at its end: is the file cut off?")]
+    Unended,
     /// It adds something to its target.
     #[error("adds an offset to its target")]
     Offset,
@@ -43,8 +50,10 @@ pub enum Cause {
 /// An instruction that moves the robot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instruction {
-    /// Its line, from 1.
+    /// Its line, from 1; counted when the program is read.
     pub line: u64,
+    /// Where its first word stands.
+    pub(super) at: usize,
     /// Its first word.
     pub word: String,
     /// Its target as it is written.
@@ -65,7 +74,7 @@ impl Instruction {
         let quoted = text[target].split_whitespace().collect::<Vec<_>>().join(" ").replace(char::is_control, "?");
         let short: String = quoted.chars().take(QUOTED).collect();
         let target = if short.len() < quoted.len() { format!("{short}...") } else { quoted };
-        Instruction { line: scan::line(text, word.start), word: text[word].to_owned(), target, moves_by }
+        Instruction { line: 0, at: word.start, word: text[word].to_owned(), target, moves_by }
     }
 }
 

@@ -8,7 +8,7 @@ use camino::Utf8Path;
 pub enum Language {
     /// Universal Robots, `.script`.
     UrScript,
-    /// ABB, `.mod`.
+    /// ABB, `.mod`, `.sys`.
     Rapid,
     /// KUKA, `.src` and `.dat`.
     Krl,
@@ -25,7 +25,7 @@ impl Language {
     fn known(self) -> (&'static str, &'static [&'static str], Option<&'static str>) {
         match self {
             Language::UrScript => ("URScript", &["script", "urscript"], None),
-            Language::Rapid => ("ABB RAPID", &["mod", "modx", "prg"], Some("`eax_a`")),
+            Language::Rapid => ("ABB RAPID", &["mod", "modx", "prg", "sys", "sysx"], Some("`eax_a`")),
             Language::Krl => ("KUKA KRL", &["src", "dat"], Some("`E1`")),
             Language::FanucLs => ("Fanuc LS", &["ls"], Some("`E1`")),
             Language::Jbi => ("Yaskawa JBI", &["jbi"], Some("the seventh number")),

@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::dialect;
 use super::instruction::Instruction;
 use super::language::{Joints, Language, Target, number};
+use super::scan::Lines;
 
 /// A program's motions and the joint targets that are written in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +21,9 @@ impl Program {
     /// Reads a program. An error says what could not be understood.
     pub fn read(language: Language, text: &str, joints: Joints) -> Result<Program, String> {
         let targets = all_targets(language, text, joints)?;
-        let motions = (dialect::of(language).motions)(text, &targets);
+        let lines = Lines::of(text);
+        let mut motions = (dialect::of(language).motions)(text, &targets);
+        motions.iter_mut().for_each(|motion| motion.line = lines.line(motion.at));
         Ok(Program { targets, motions })
     }
 
@@ -59,7 +62,12 @@ fn all_targets(language: Language, text: &str, joints: Joints) -> Result<Vec<Tar
             joints.count()
         ));
     }
+    let lines = Lines::of(text);
     let converted = |mut t: Target| {
+        t.line = lines.line(t.places[0].start);
+        if t.name.is_empty() {
+            t.name = format!("line {}", t.line);
+        }
         for (joint, reading) in t.readings.iter_mut().enumerate() {
             *reading /= joints.factor(language, t.pulses, joint);
         }

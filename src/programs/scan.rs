@@ -54,14 +54,13 @@ pub fn labelled(text: &str, at: usize, labels: &[String]) -> Option<Vec<Number>>
     Some(numbers)
 }
 
-/// A target of these numbers; named by its line where it has no name. `open` is the bracket that it begins with, where
-/// it has one.
+/// A target of these numbers, whose line is still to be counted; its name is empty where it has none. `open` is the
+/// bracket that it begins with, where it has one.
 pub fn target(text: &str, name: Option<String>, numbers: Vec<Number>, open: Option<usize>) -> Option<Target> {
     let (first, last) = (numbers.first()?.1.start, numbers.last()?.1.end);
-    let line = line(text, first);
     let whole = open.and_then(|open| Some(open..closed(text, open)?)).unwrap_or(first..last);
     let (readings, places) = numbers.into_iter().unzip();
-    Some(Target { name: name.unwrap_or_else(|| format!("line {line}")), line, readings, places, whole, pulses: false })
+    Some(Target { name: name.unwrap_or_default(), line: 0, readings, places, whole, pulses: false })
 }
 
 /// Names of the axes: those of the robot by this letter, then `E1`, `E2` and so on of external ones.
@@ -69,9 +68,18 @@ pub fn axes(letter: char, count: usize) -> Vec<String> {
     (0..count).map(|k| if k < 6 { format!("{letter}{}", k + 1) } else { format!("E{}", k - 5) }).collect()
 }
 
-/// Line of a place, from 1.
-pub fn line(text: &str, at: usize) -> u64 {
-    1 + text[..at].bytes().filter(|b| *b == b'\n').count() as u64
+/// Where the lines of a text end.
+pub struct Lines(Vec<usize>);
+
+impl Lines {
+    pub fn of(text: &str) -> Lines {
+        Lines(text.match_indices('\n').map(|(at, _)| at).collect())
+    }
+
+    /// Line of a place, from 1.
+    pub fn line(&self, at: usize) -> u64 {
+        1 + self.0.partition_point(|end| *end < at) as u64
+    }
 }
 
 /// The text with blanks in place of comments (from `mark` to the line's end) and of what stands between double quotes

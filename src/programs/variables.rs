@@ -79,8 +79,7 @@ impl Variables {
 
     /// The targets that a variable can hold, or why they are not known.
     pub(super) fn held(&self, name: &str) -> Result<Vec<usize>, Cause> {
-        let mut found = BTreeSet::new();
-        let mut visited = BTreeSet::new();
+        let (mut found, mut visited, mut doubt) = (BTreeSet::new(), BTreeSet::new(), None);
         let mut open = vec![self.key(name)];
         while let Some(name) = open.pop() {
             if !visited.insert(name.clone()) {
@@ -90,11 +89,22 @@ impl Variables {
                 match value {
                     Value::Targets(range) => found.extend(range.clone()),
                     Value::Of(other) => open.push(other.clone()),
-                    Value::Other(cause) => return Err(cause.clone()),
+                    // A variable that holds a pose anywhere is one of poses, whatever else is written into it.
+                    Value::Other(Cause::Cartesian) => return Err(Cause::Cartesian),
+                    Value::Other(cause) => doubt = doubt.or_else(|| Some(cause.clone())),
                 }
             }
         }
-        if found.is_empty() { Err(Cause::Elsewhere) } else { Ok(found.into_iter().collect()) }
+        match doubt {
+            Some(cause) => Err(cause),
+            None if found.is_empty() => Err(Cause::Elsewhere),
+            None => Ok(found.into_iter().collect()),
+        }
+    }
+
+    /// Whether anything is written into a variable.
+    pub(super) fn knows(&self, name: &str) -> bool {
+        self.values.contains_key(&self.key(name))
     }
 
     /// What an expression is: one joint target as numbers, or a variable, an element of one included.

@@ -187,11 +187,13 @@ fn programs_keep_everything_but_their_joint_targets() {
     let said = run(folder.path(), &["whole.script", "--out", "whole"], 0);
     assert!(said.contains("all 2 motions move to them"), "{said}");
     std::fs::write(folder.path().join("none.script"), "movel(p[0.1,0.2,0.3,0,0,0])\n").unwrap();
+    // What corrects nothing is not offered.
+    let of_poses = "1 motion, 0 through joint targets; line 1: movel p[0.1,0.2,0.3,0,0,0] is Cartesian";
+    let said = run(folder.path(), &["none.script", "--out", "x"], 2);
+    assert!(said.contains(of_poses) && said.contains("CSV") && !said.contains("--joint-targets-only"), "{said}");
     let said = run(folder.path(), &["none.script", "--out", "x", "--joint-targets-only"], 2);
-    assert!(
-        said.contains("nothing in this URScript program moves to a joint target of 6 numbers") && said.contains("CSV"),
-        "{said}"
-    );
+    let nothing = format!("nothing in this URScript program moves to a joint target of 6 numbers: {of_poses}");
+    assert!(said.contains(&nothing) && said.contains("CSV"), "{said}");
     // A list of numbers by which nothing moves is nobody's target, whatever its name ends in.
     let list = rad(&q[0]);
     let pose = "p[0.1,0.2,0.3,0,0,0]";
@@ -408,6 +410,83 @@ fn a_target_beyond_a_joints_range_is_named_so() {
     }
 }
 
+/// Only URScript has radians; system modules are RAPID; one motion is one.
+#[test]
+fn a_reading_beyond_a_range_is_asked_for_radians_where_there_are_any() {
+    let folder = workplace();
+    let (nominal, _) = robots_of(folder.path(), "abb-irb120");
+    let mut list = postures(&nominal, 1);
+    std::fs::write(folder.path().join("a.sys"), rapid(&list, "")).unwrap();
+    let said = run(folder.path(), &["a.sys"], 0);
+    assert!(said.contains("the program has one motion, and it is corrected"), "{said}");
+    list[0][0] = 999.0;
+    std::fs::write(folder.path().join("far.mod"), rapid(&list, "")).unwrap();
+    let said = run(folder.path(), &["far.mod", "--out", "far"], 1);
+    assert!(said.contains("joint 1 of the target is at 999.000") && !said.contains("radians"), "{said}");
+    let q: Vec<String> = radians(&list[0]).iter().map(f64::to_string).collect();
+    std::fs::write(folder.path().join("far.script"), format!("movej([{}])\n", q.join(","))).unwrap();
+    let said = run(folder.path(), &["far.script", "--out", "script"], 1);
+    assert!(said.contains("where radians are read?"), "{said}");
+}
+
+/// Beside a singular posture of the wrist.
+#[test]
+fn a_correction_that_turns_a_joint_far_is_said() {
+    let folder = workplace();
+    robots(folder.path());
+    std::fs::write(folder.path().join("t.csv"), csv(&[vec![20.0, -70.0, 80.0, -50.0, 60.0, 10.0]])).unwrap();
+    assert!(!run(folder.path(), &["t.csv"], 0).contains("turns joint"));
+    let near = |wrist_deg: f64| {
+        std::fs::write(folder.path().join("t.csv"), csv(&[vec![20.0, -70.0, 80.0, -50.0, wrist_deg, 10.0]])).unwrap();
+        let all = ["compensate", "t.csv", "--robot", "robot.toml", "--identified", "identified.toml", "--force"];
+        let output = stereocal(folder.path(), &all);
+        (output.status.code(), stdout(&output))
+    };
+    let told: Vec<_> =
+        [0.7, 1.0, 1.4, 2.0, 2.8].map(near).into_iter().filter(|(status, _)| *status == Some(0)).collect();
+    let said = "the correction of p0 (line 2) turns joint ";
+    assert!(told.iter().any(|(_, text)| text.contains(said)), "{told:?}");
+}
+
+/// What moves the arm and is not corrected, in the words of each maker; without it the program is corrected.
+#[test]
+fn programs_are_refused_for_what_leads_the_arm() {
+    let folder = workplace();
+    robots_of(folder.path(), "abb-irb120");
+    let job = |line: &str| {
+        format!(
+            "/JOB\n//POS\n///NPOS 1,0,0,0,0,0\n///PULSE\nC00000=10000,20000,-15000,5000,40000,30000\n//INST\nNOP\n{line}MOVJ C00000 VJ=5.00\nEND\n"
+        )
+    };
+    let module = |line: &str| {
+        format!(
+            "MODULE m\nCONST jointtarget j:=[[10,20,-15,5,40,30],[9E9,9E9,9E9,9E9,9E9,9E9]];\nPROC main()\nMoveAbsJ j,v100,fine,tool0;\n{line}ENDPROC\nENDMODULE\n"
+        )
+    };
+    let pulses = ["--pulses-per-deg", "1000,1000,1000,1000,1000,1000"];
+    for (name, clean, planted, said_of_it) in [
+        ("a.jbi", job(""), job("FORMCUT FCF#(2)\n"), "line 8: FORMCUT FCF#(2) moves by values"),
+        ("a.jbi", job(""), job("GLIDE C00000\n"), "line 8: GLIDE C00000 is an instruction that is not known here"),
+        ("a.mod", module(""), module("BECheckTcp tGun;\n"), "line 5: BECheckTcp tGun moves by values"),
+        (
+            "a.mod",
+            module(""),
+            module("Park pSafe, j;\nMovePose pSafe;\n"),
+            "line 6: MovePose pSafe is an instruction that is not known here",
+        ),
+    ] {
+        std::fs::write(folder.path().join(name), clean).unwrap();
+        let with =
+            |more: &[&str], status: i32| run(folder.path(), &[&[name, "--force"], &pulses[..], more].concat(), status);
+        with(&[], 0);
+        std::fs::write(folder.path().join(name), planted).unwrap();
+        let said = with(&[], 2);
+        assert!(said.contains("2 motions, 1 through joint targets; ") && said.contains(said_of_it), "{said}");
+        let said = with(&["--joint-targets-only"], 1);
+        assert!(said.contains("1 of 2 motions move to them; 1 left as written") && said.contains(said_of_it), "{said}");
+    }
+}
+
 #[test]
 fn seven_joints_need_their_order() {
     let folder = workplace();
@@ -449,7 +528,13 @@ fn what_only_looks_like_joint_targets_is_refused() {
     // Points of inline forms.
     std::fs::write(folder.path().join("inline.src"), "DEF a( )\nPTP XP1\nEND\n").unwrap();
     let said = run(folder.path(), &["inline.src"], 2);
-    assert!(said.contains("PTP XP1 moves by values") && said.contains(".dat file of this name"), "{said}");
+    assert!(
+        said.contains("PTP XP1 goes to a point that is declared in none of the files read")
+            && said.contains(".dat file of this name")
+            && said.contains("`XHOME` and what else all programs use in `$config.dat`")
+            && !said.contains("--joint-targets-only"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -544,7 +629,9 @@ fn a_program_is_corrected_with_the_points_of_its_data_file() {
     assert!(said.contains("a.dat is what `compensate` wrote"), "{said}");
     // A pose, and a point that is in neither.
     std::fs::write(at.join("a.dat"), &data).unwrap();
-    for (point, why) in [("XP6", "PTP XP6 is Cartesian"), ("XP7", "PTP XP7 moves by values")] {
+    for (point, why) in
+        [("XP6", "PTP XP6 is Cartesian"), ("XP7", "PTP XP7 goes to a point that is declared in none of")]
+    {
         std::fs::write(at.join("a.src"), program(point)).unwrap();
         let said = run(at, &["a.src", "--out", "q"], 2);
         assert!(said.contains(why), "{said}");

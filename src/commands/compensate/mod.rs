@@ -84,8 +84,10 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
 
 /// Readings for all rows; those without a posture get one where the robot was identified, if there is one.
 fn compensated(args: &Compensate, pair: &Pair, rows: &[Row]) -> Vec<Compensated> {
+    // Of the languages one alone has radians; a table may have them.
+    let radians = Language::of(&args.targets).is_none_or(|language| language == Language::UrScript);
     let list: Vec<Target> = rows.iter().map(|row| row.target.clone()).collect();
-    let compensator = Compensator::new(&pair.nominal, &pair.identified, pair.tool_mm);
+    let compensator = Compensator::new(&pair.nominal, &pair.identified, pair.tool_mm).given_in_radians(radians);
     match super::beyond::identified_over(&args.identified, &pair.identified) {
         Some(ranges) => compensator.identified_over(&ranges).compensate(&list),
         None => compensator.compensate(&list),

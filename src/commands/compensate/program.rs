@@ -16,7 +16,7 @@ use crate::robot::Robot;
 const LEFT_HINT: &str = "`--joint-targets-only` corrects the joint targets and names the motions that it leaves as they are; \
                          their poses can be compensated as a CSV of name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad";
 const DATA_HINT: &str = "points of inline forms stand in the .dat file of this name, which is read and corrected with this one where it stands \
-                         beside it; `--joint-targets-only` corrects what is there and names the motions that it leaves";
+                         beside it; KUKA keeps `XHOME` and what else all programs use in `$config.dat`";
 const ALONE_HINT: &str = "`--joint-targets-only` corrects them, where everything that uses them is a motion";
 const OF_DATA_HINT: &str = "`stereocal compensate NAME.src`, with this file beside it, corrects both; `--joint-targets-only` corrects them all, where \
                             everything that uses them is a motion";
@@ -54,25 +54,21 @@ impl Program {
         };
         let mut source = Source::read(path)?;
         let mut read = understood(&source)?;
-        if language.has_data_file(path) && read.motions.iter().any(|m| m.moves_by == Err(Cause::Elsewhere)) {
+        if language.has_data_file(path) && read.motions.iter().any(|m| is_elsewhere(&m.moves_by)) {
             source = source.with_data(path)?;
             read = understood(&source)?;
         }
         if !args.joint_targets_only
             && let Some(first) = read.motions.iter().find(|motion| motion.moves_by.is_err())
         {
-            let name = first.target.chars().all(|c| c.is_alphanumeric() || c == '_');
-            let hint = match first.moves_by {
-                Err(Cause::Elsewhere) if name && language.has_data_file(path) => DATA_HINT,
-                _ => LEFT_HINT,
-            };
-            return Err(refuse(counted(&read.motions, first), hint));
+            return Err(refuse(counted(&read.motions, first), &left_hint(&read.motions, first)));
         }
         let moved_by = read.moved_by(language);
         if moved_by.is_empty() {
             let message =
                 format!("nothing in this {} program moves to a joint target of {count} numbers", language.name());
-            return Err(refuse(message, CSV_HINT));
+            let motions = read.motions.first().map(|first| format!(": {}", counted(&read.motions, first)));
+            return Err(refuse(message + &motions.unwrap_or_default(), CSV_HINT));
         }
         if read.motions.is_empty() && !args.joint_targets_only {
             let is_data = language == Language::Krl && !language.has_data_file(path);
@@ -133,9 +129,27 @@ impl Program {
                 Some(cause) => Err(cause),
                 None => Ok(targets),
             });
-            Instruction { moves_by, ..motion.clone() }
+            let mut motion = motion.clone();
+            motion.moves_by = moves_by;
+            motion
         };
         self.read.motions.iter().map(outcome).collect()
+    }
+}
+
+/// Whether a motion's point may stand in a data file.
+fn is_elsewhere(moves_by: &Result<Vec<usize>, Cause>) -> bool {
+    matches!(moves_by, Err(Cause::Elsewhere | Cause::Undeclared))
+}
+
+/// What to do about motions of which this one is the first that is not corrected.
+fn left_hint(motions: &[Instruction], first: &Instruction) -> String {
+    let in_data = first.moves_by == Err(Cause::Undeclared);
+    match motions.iter().any(|motion| motion.moves_by.is_ok()) {
+        true if in_data => format!("{DATA_HINT}; {LEFT_HINT}"),
+        true => LEFT_HINT.to_owned(),
+        false if in_data => DATA_HINT.to_owned(),
+        false => CSV_HINT.to_owned(),
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::pair::Pair;
-use crate::compensate::Compensated;
+use crate::compensate::{Compensated, Target};
 use crate::diagnostic::count;
 use crate::formats::targets::Row;
 use crate::programs::{Cause, Instruction};
@@ -11,6 +11,9 @@ use crate::robot::Check;
 
 /// Length of the lists of refused targets and of motions that stay as they are on the terminal.
 const MOST_SAID: usize = 20;
+
+/// Corrections that turn a joint farther are said, deg: arms are off by fractions of a degree.
+const FAR_TURN_DEG: f64 = 5.0;
 
 /// What `compensate.json` says.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -33,6 +36,9 @@ pub(super) struct Summary {
     check: Option<Check>,
     /// Those without.
     refused: Vec<Refused>,
+    /// The correction that turns a joint farthest, where that is far.
+    #[serde(skip)]
+    far_turn: Option<String>,
     /// Of a program: every instruction that moves the robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     motions: Option<Vec<Moved>>,
@@ -74,6 +80,7 @@ impl Summary {
             orientation_left_deg: found.iter().filter_map(|f| f.left_rad).reduce(f64::max).map(f64::to_degrees),
             tool_mm: pair.tool_mm.map(Into::into),
             check: pair.check.clone(),
+            far_turn: far_turn(rows, found, pair),
             refused,
             motions: motions.map(|motions| motions.iter().map(Moved::new).collect()),
         }
@@ -98,6 +105,28 @@ impl Moved {
     }
 }
 
+/// Which joint is turned farthest by a correction of readings, and at which target, where that is far.
+fn far_turn(rows: &[Row], found: &[Compensated], pair: &Pair) -> Option<String> {
+    let turns = rows.iter().zip(found).filter_map(|(row, found)| match (&row.target, &found.readings) {
+        (Target::Readings(given), Ok(readings)) => Some((row, given.iter().zip(readings).zip(&pair.nominal.joints))),
+        _ => None,
+    });
+    let turns = turns.flat_map(|(row, joints)| {
+        let turning = joints.enumerate().filter(|(_, (_, joint))| !joint.slides);
+        turning.map(move |(j, ((a, b), _))| ((b - a).abs().to_degrees(), j + 1, row))
+    });
+    let (turn_deg, joint, row) = turns.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|(turn, ..)| *turn > FAR_TURN_DEG)?;
+    Some(format!(
+        "the correction of {} turns joint {joint} by {turn_deg:.1} deg, farther than any other: beside a singular posture small corrections are large turns",
+        named(&row.name, row.line)
+    ))
+}
+
+/// A target by its name and its line.
+fn named(name: &str, line: u64) -> String {
+    if name == format!("line {line}") { name.to_owned() } else { format!("{name} (line {line})") }
+}
+
 /// The lines on the terminal.
 pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction]>, written: &str) -> String {
     let mut text = pair.same.as_ref().map_or_else(String::new, |same| format!("{same}\n"));
@@ -107,7 +136,7 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
         text += &match motions.len() {
             0 => "no instruction in this file moves to them: whether each use of them is a motion is not known\n"
                 .to_owned(),
-            1 if through == 1 => "the one motion to them is compensated\n".to_owned(),
+            1 if through == 1 => "the program has one motion, and it is corrected\n".to_owned(),
             _ if through == 0 => "no motion is corrected: the program is left as written\n".to_owned(),
             all if all == through => format!("all {all} motions move to them\n"),
             all => format!("{through} of {all} motions move to them; {} left as written\n", all - through),
@@ -126,17 +155,14 @@ pub(super) fn said(summary: &Summary, pair: &Pair, motions: Option<&[Instruction
             pair.nominal.joints.len()
         );
     }
+    summary.far_turn.iter().for_each(|said| text += &format!("{said}\n"));
     pair.of_tools.iter().for_each(|said| text += &format!("{said}\n"));
     let left = motions.into_iter().flatten().filter(|m| m.moves_by.is_err());
     let left: Vec<String> = left.map(|m| format!("left: {m}")).collect();
     // Of a program's target the motion to it says why.
     let is_said = |r: &&Refused| left.iter().any(|motion| motion.ends_with(&r.reason));
     let refused: Vec<&Refused> = summary.refused.iter().filter(|r| !is_said(r)).collect();
-    let named = |r: &Refused| match r.name == format!("line {}", r.line) {
-        true => r.name.clone(),
-        false => format!("{} (line {})", r.name, r.line),
-    };
-    let lines = refused.iter().map(|r| format!("not compensated: {}: {}", named(r), r.reason));
+    let lines = refused.iter().map(|r| format!("not compensated: {}: {}", named(&r.name, r.line), r.reason));
     listed(&mut text, lines, refused.len(), "compensated.csv");
     let of_motions = left.len();
     listed(&mut text, left.into_iter(), of_motions, "compensate.json");

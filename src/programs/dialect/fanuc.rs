@@ -1,5 +1,9 @@
 //! Fanuc's listing: positions `J1= .. deg` behind `/POS`.
+//!
+//! In: the text of a listing. Out: its positions of joints, and its instructions that move, each with what shifts or
+//! leads it. What goes wrong: a last instruction without its end.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::ops::Range;
 
@@ -15,7 +19,17 @@ const OFFSET: &str = "OFFSET";
 /// The one that makes it relative to the point before.
 const RELATIVE: &str = "INC";
 /// Options that follow a sensor.
-const LED: [&str; 3] = ["TRACK", "TAST", "AVC"];
+const LED: [&str; 4] = ["TRACK", "TAST", "AVC", "SEARCH"];
+/// How instructions begin that shift the motions behind them, or let a sensor or a force lead the arm, up to one that
+/// begins the same and ends in one of `ENDS`.
+const LEADS: [(&[&str], Cause); 5] = [
+    (&["TOUCH", OFFSET], Cause::Offset),
+    (&["MP", OFFSET], Cause::Offset),
+    (&["TRACK"], Cause::Led),
+    (&["SOFTFLOAT"], Cause::Led),
+    (&["FORCE", "CTRL"], Cause::Led),
+];
+const ENDS: [&str; 2] = ["END", "OFF"];
 
 /// Positions in joint coordinates, by their number.
 pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
@@ -36,11 +50,8 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     let start = text.find("/MN").map_or(0, |at| at + 3);
     let end = text[start..].find("/POS").map_or(text.len(), |length| start + length);
     let code = instructions(&text[..end]);
-    let written = written(&code[start..]);
-    let mut from = start;
-    let statements =
-        code[start..].match_indices(';').map(|(k, _)| std::mem::replace(&mut from, start + k + 1)..start + k);
-    let motion = |word: Range<usize>, group: Option<&str>, end_of_it: usize| {
+    let positions = Positions::read(&text[end..], targets, written(&code[start..]));
+    let motion = |word: Range<usize>, group: Option<&str>, end_of_it: usize, led: &Option<Cause>| {
         let points = points(&code, word.end..end_of_it);
         let Some(last) = points.last().map(|point| point.end) else {
             // Positions of a pallet, and what else is none of the program's own.
@@ -48,21 +59,44 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             let end = code[target.clone()].find(char::is_whitespace).map_or(target.end, |k| target.start + k);
             return Instruction::new(text, word, target.start..end, Err(Cause::Elsewhere));
         };
-        let moves_by = points.iter().map(|point| position(&text[end..], &code[point.clone()], targets, &written));
+        let moves_by = points.iter().map(|point| positions.held(&code[point.clone()]));
         let moves_by = moves_by.collect::<Result<Vec<usize>, Cause>>();
         let group = group.filter(|group| *group != "GP1").map(|_| Cause::Group);
-        let moves_by = moves_by.and_then(|found| match option(&code[last..end_of_it]).or(group) {
+        let moves_by = moves_by.and_then(|found| match option(&code[last..end_of_it]).or(group).or(led.clone()) {
             Some(cause) => Err(cause),
             None => Ok(found),
         });
         Instruction::new(text, word, points[0].start..last, moves_by)
     };
-    let in_statement = |at: Range<usize>| {
+    let (mut from, mut leads, mut found) = (start, Vec::<usize>::new(), Vec::new());
+    for next in code[start..].match_indices(';').map(|(k, _)| start + k).chain([code.len()]) {
+        let at = std::mem::replace(&mut from, next + 1)..next;
+        if let Some((lead, word, begins)) = lead(&code, at.clone()) {
+            leads.retain(|other| *other != lead);
+            leads.extend(begins.then_some(lead));
+            // The arm may move by it alone.
+            let led = LEADS[lead].1.clone();
+            found.extend((begins && led == Cause::Led).then(|| Instruction::new(text, word, at.end..at.end, Err(led))));
+            continue;
+        }
+        let unended = (next == code.len()).then_some(Cause::Unended);
+        let led = unended.or_else(|| leads.first().map(|lead| LEADS[*lead].1.clone()));
         let words = words(&code, at.clone());
         let ends: Vec<usize> = words.iter().skip(1).map(|(word, _)| word.start).chain([at.end]).collect();
-        words.into_iter().zip(ends).map(|((word, group), end)| motion(word, group, end)).collect::<Vec<_>>()
-    };
-    statements.flat_map(in_statement).collect()
+        found.extend(words.into_iter().zip(ends).map(|((word, group), end)| motion(word, group, end, &led)));
+    }
+    found
+}
+
+/// Which of the leads a statement is, its words, and whether it begins there.
+fn lead(code: &str, at: Range<usize>) -> Option<(usize, Range<usize>, bool)> {
+    let places: Vec<Range<usize>> = scan::words(&code[at.clone()]).collect();
+    let words: Vec<String> = places.iter().map(|w| code[at.clone()][w.clone()].to_ascii_uppercase()).collect();
+    let begins =
+        |(head, _): &(&[&str], Cause)| words.len() >= head.len() && head.iter().zip(&words).all(|(a, b)| a == b);
+    let lead = LEADS.iter().position(begins)?;
+    let word = at.start + places[0].start..at.start + places[LEADS[lead].0.len() - 1].end;
+    Some((lead, word, !words.last().is_some_and(|last| ENDS.contains(&last.as_str()))))
 }
 
 /// The words of a statement that move, each with the group of axes named before it: one that stands first, or that has
@@ -156,23 +190,45 @@ fn points(code: &str, at: Range<usize>) -> Vec<Range<usize>> {
     }
 }
 
-/// The joint target of a point of a motion, from the positions behind `/POS`.
-fn position(positions: &str, point: &str, targets: &[Target], written: &[Option<u64>]) -> Result<usize, Cause> {
-    let number = number(point).ok_or(Cause::Elsewhere)?;
-    let mut found = targets.iter().enumerate().filter(|(_, t)| self::number(&t.name) == Some(number));
-    match (found.next(), found.next()) {
-        (Some(_), None) if written.iter().any(|w| w.is_none_or(|w| w == number)) => Err(Cause::Elsewhere),
-        (Some((k, _)), None) => Ok(k),
-        (Some(_), Some(_)) => Err(Cause::Groups),
-        (None, _) => {
-            let mut listed = positions.match_indices("P[").map(|(at, _)| &positions[at..]);
-            let body = listed.find(|at| self::number(at) == Some(number)).and_then(|at| at.split('}').next());
-            Err(match body {
-                None => Cause::Elsewhere,
-                // Of a tool that is held in place, RX.
-                Some(body) if scan::words(body).any(|w| ["X", "RX"].contains(&&body[w])) => Cause::Cartesian,
-                Some(_) => Cause::Incomplete,
-            })
+/// What stands behind `/POS`.
+struct Positions<'a> {
+    text: &'a str,
+    /// Joint targets by the numbers of their positions; of two groups there are two.
+    joints: BTreeMap<u64, Vec<usize>>,
+    /// Where each position begins.
+    listed: BTreeMap<u64, usize>,
+    written: Vec<Option<u64>>,
+}
+
+impl Positions<'_> {
+    fn read<'a>(text: &'a str, targets: &[Target], written: Vec<Option<u64>>) -> Positions<'a> {
+        let mut joints: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        for (k, number) in targets.iter().enumerate().filter_map(|(k, t)| Some((k, number(&t.name)?))) {
+            joints.entry(number).or_default().push(k);
+        }
+        let mut listed = BTreeMap::new();
+        for (at, number) in text.match_indices("P[").filter_map(|(at, _)| Some((at, number(&text[at..])?))) {
+            listed.entry(number).or_insert(at);
+        }
+        Positions { text, joints, listed, written }
+    }
+
+    /// The joint target of a point of a motion.
+    fn held(&self, point: &str) -> Result<usize, Cause> {
+        let number = number(point).ok_or(Cause::Elsewhere)?;
+        match self.joints.get(&number).map(Vec::as_slice) {
+            Some([_]) if self.written.iter().any(|w| w.is_none_or(|w| w == number)) => Err(Cause::Elsewhere),
+            Some([k]) => Ok(*k),
+            Some(_) => Err(Cause::Groups),
+            None => {
+                let body = self.listed.get(&number).and_then(|&at| self.text[at..].split('}').next());
+                Err(match body {
+                    None => Cause::Elsewhere,
+                    // Of a tool that is held in place, RX.
+                    Some(body) if scan::words(body).any(|w| ["X", "RX"].contains(&&body[w])) => Cause::Cartesian,
+                    Some(_) => Cause::Incomplete,
+                })
+            }
         }
     }
 }

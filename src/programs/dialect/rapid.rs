@@ -1,5 +1,9 @@
 //! ABB's language: `jointtarget` values, `[[six robot axes],[external axes]]`, deg.
+//!
+//! In: the text of a module. Out: its joint targets, and its instructions that move; among them calls of routines that
+//! stand in other modules and get a target that no motion of this one has. What goes wrong: a motion without its end.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::ops::Range;
 
@@ -14,23 +18,38 @@ const AXES: usize = 6;
 
 /// How the words of instructions that move to poses of the tool begin; they have a point, a speed, a zone and a tool at
 /// the least.
-const CARTESIAN: [&str; 22] = [
+const CARTESIAN: [&str; 25] = [
     "MoveJ", "MoveL", "MoveC", "TriggJ", "TriggL", "TriggC", "SearchL", "SearchC", "ArcL", "ArcC", "ArcJ", "SpotL",
-    "SpotJ", "SpotML", "SpotMJ", "DispL", "DispC", "PaintL", "PaintC", "NutL", "NutJ", "ContactL",
+    "SpotJ", "SpotML", "SpotMJ", "DispL", "DispC", "PaintL", "PaintC", "NutL", "NutJ", "ContactL", "ArcMoveL",
+    "ArcMoveC", "ArcMoveJ",
 ];
 /// Those that move to joint targets.
-const JOINT: &str = "MoveAbsJ MoveAbsJAO MoveAbsJDO MoveAbsJGO MoveAbsJSync TriggAbsJ";
+const JOINT: &str = "MoveAbsJ MoveAbsJAO MoveAbsJDO MoveAbsJGO MoveAbsJSync TriggAbsJ ArcMoveAbsJ";
 /// How routines begin that are called after them.
 const LIKE_JOINT: [&str; 2] = ["MoveAbsJ", "TriggAbsJ"];
 /// Those that move external axes alone.
-const EXTERNAL: [&str; 6] = ["MoveExtJ", "SearchExtJ", "IndAMove", "IndCMove", "IndDMove", "IndRMove"];
+const EXTERNAL: [&str; 7] = ["MoveExtJ", "ArcMoveExtJ", "SearchExtJ", "IndAMove", "IndCMove", "IndDMove", "IndRMove"];
 /// Those that follow a sensor or a force.
-const LED: [&str; 6] = ["EGMRun", "EGMMove", "FCPress", "FCAct", "CapL", "CapC"];
+const LED: [&str; 9] = ["EGMRun", "EGMMove", "FCPress", "FCAct", "FCRef", "CapL", "CapC", "SoftAct", "CSSAct"];
+/// Those that move along a path of their own: to find a tool or a load, or back along what was recorded.
+const ALONE: &str =
+    "BEUpdateTcp BECheckTcp BERefPointer BESetupToolJ PathRecMoveBwd PathRecMoveFwd StepBwdPath ManLoadIdProc LoadId";
+/// Routines that a name does not tell from motions begin so.
+const MOVE: &str = "Move";
 
 /// Instructions and functions that leave what they are given as it is.
 const READING: &str = "MoveExtJ IndAMove IndCMove IndDMove IndRMove TPWrite TPShow Write WriteAnyBin WriteStrBin PackRawBytes ErrWrite \
     ErrLog SocketSend RMQSendMessage RMQSendWait IPers WaitUntil CalcRobT ValToStr NumToStr Abs Round Trunc Dim \
-    IsPers IsVar";
+    IsPers IsVar WZHomeJointDef WZLimJointDef PDispOn EOffsOn MToolTCPCalib MToolRotCalib SToolTCPCalib SToolRotCalib";
+/// Instructions that may write into what they are given, and move nothing.
+const WRITING: &str = "Incr Decr Add Clear UnpackRawBytes ReadAnyBin ReadVar RMQGetMsgData RMQGetMessage RMQReadWait GetDataVal SetDataVal \
+    SocketReceive";
+/// Types of targets.
+const TYPES: [&str; 2] = ["jointtarget", "robtarget"];
+/// Functions whose value is a target.
+const TARGETS: &str = "Offs RelTool CRobT CJointT CalcRobT CalcJointT ORobT MirPos";
+/// What declares data.
+const DECLARES: &str = "VAR PERS CONST LOCAL TASK";
 /// Words that are no calls.
 const KEYWORDS: &str = "IF THEN ELSEIF ELSE ENDIF WHILE DO ENDWHILE FOR FROM TO STEP ENDFOR TEST CASE DEFAULT ENDTEST RETURN RAISE GOTO \
     CONNECT WITH AND OR NOT XOR DIV MOD PROC ENDPROC FUNC ENDFUNC TRAP ENDTRAP MODULE ENDMODULE ERROR UNDO BACKWARD \
@@ -45,7 +64,7 @@ const SYNTAX: Syntax = Syntax {
         reads: |word| handed::of(JOINT, word) || handed::of(READING, word),
         by_value: |parameters| !scan::words(parameters).any(|word| handed::of("INOUT VAR PERS REF", &parameters[word])),
         keywords: KEYWORDS,
-        declares: "VAR PERS CONST LOCAL TASK",
+        declares: DECLARES,
         bare: true,
         by_name: "SetDataVal SetAllDataVal",
     }),
@@ -77,24 +96,48 @@ pub(super) fn targets(text: &str, count: usize) -> Vec<Target> {
     text.match_indices('[').filter_map(|(at, _)| value(at)).collect()
 }
 
-/// Every instruction that moves: those whose words are known, and any other one that is given a speed or a zone.
+/// Every instruction that moves: those whose words are known, any other one that is given a speed or a zone, and calls
+/// of what this file does not hold.
 pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     let code = scan::code(text, "!");
     let variables = Variables::read(&code, SYNTAX, targets);
-    let mut from = 0;
-    let statements = code.match_indices(';').map(|(end, _)| std::mem::replace(&mut from, end + 1)..end);
-    let motion = |at: Range<usize>| {
-        let (word, kind) = known(&code, at.clone()).or_else(|| unknown(&code, at.clone()))?;
-        let arguments = arguments(&code, word.end..at.end);
-        let place = if begins(&code[word.clone()], "Search") { 2 } else { 0 };
-        let target = arguments.get(place).or(arguments.first()).cloned().unwrap_or(word.end..word.end);
-        let moves_by = match kind {
-            None => variables.expression(&code, target.clone(), targets),
-            Some(cause) => Err(cause),
-        };
-        Some(Instruction::new(text, word, target, moves_by))
+    let (mut from, mut found, mut calls) = (0, Vec::new(), Vec::new());
+    for end in code.match_indices(';').map(|(end, _)| end).chain([code.len()]) {
+        let mut at = std::mem::replace(&mut from, end + 1)..end;
+        let mut next = known(&code, at.clone());
+        if next.is_none() {
+            calls.extend(called(&code, at.clone()).map(|word| (word, end)));
+        }
+        while let Some((word, kind)) = next {
+            at.start = word.end;
+            // A motion behind this one, or nothing else: its end is missing.
+            next = known(&code, at.clone()).filter(|(next, _)| is_operand(code[at.start..next.start].trim_end()));
+            let stop = next.as_ref().map_or(end, |(next, _)| next.start);
+            let unended = (next.is_some() || end == code.len()).then_some(Cause::Unended);
+            let arguments = arguments(&code, word.end..stop);
+            let place = if begins(&code[word.clone()], "Search") { 2 } else { 0 };
+            let target = arguments.get(place).or(arguments.first()).cloned().unwrap_or(word.end..word.end);
+            let moves_by = match kind.or(unended) {
+                None => variables.expression(&code, target.clone(), targets),
+                Some(cause) => Err(cause),
+            };
+            found.push(Instruction::new(text, word, target, moves_by));
+        }
+    }
+    let corrected: BTreeSet<usize> = found.iter().flat_map(|m| m.moves_by.iter().flatten().copied()).collect();
+    let is_corrected = |at: Range<usize>| {
+        let held = variables.expression(&code, at, targets);
+        held.is_ok_and(|held| held.iter().all(|k| corrected.contains(k)))
     };
-    statements.filter_map(motion).collect()
+    let unknown = unknown(&code, calls, is_corrected).into_iter();
+    found.extend(unknown.map(|(word, target, cause)| Instruction::new(text, word, target, Err(cause))));
+    found.sort_by_key(|motion| motion.at);
+    found
+}
+
+/// Whether an operand of an expression ends there, behind which no other one can stand.
+fn is_operand(before: &str) -> bool {
+    before.ends_with(|c: char| c.is_alphanumeric() || "_]})".contains(c))
 }
 
 fn begins(word: &str, head: &str) -> bool {
@@ -110,7 +153,9 @@ fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> 
         let declared = SYNTAX.routines.iter().any(|r| r.eq_ignore_ascii_case(std::mem::replace(&mut last, name)));
         let before = code[..word.start].ends_with(['\\', '.', ',', '(', '=']);
         let behind = code[word.end..at.end].trim_start();
-        if declared || before || behind.is_empty() || behind.starts_with(['(', ':', '.', ',', ')', '=']) {
+        let is_alone = handed::of(ALONE, name);
+        if declared || before || (behind.is_empty() && !is_alone) || behind.starts_with(['(', ':', '.', ',', ')', '='])
+        {
             continue;
         }
         let of = |words: &[&str]| words.iter().any(|w| begins(name, w));
@@ -118,6 +163,7 @@ fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> 
         let kind = match () {
             () if handed::of(JOINT, name) => None,
             () if of(&LIKE_JOINT) => Some(Cause::Unknown),
+            () if is_alone => Some(Cause::Elsewhere),
             () if of(&EXTERNAL) => Some(Cause::External),
             () if of(&LED) => Some(Cause::Led),
             // A routine may have such a name, as in `MoveLeft 10;`.
@@ -129,35 +175,115 @@ fn known(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> 
     None
 }
 
-/// The word of a statement that is given a speed or a zone among its arguments: a routine that moves, or an instruction
-/// of an option.
-fn unknown(code: &str, at: Range<usize>) -> Option<(Range<usize>, Option<Cause>)> {
-    let parts = scan::parts(code, at.clone());
-    let numbered = |text: &str, head: char| {
-        let mut chars = text.chars();
+/// The word of a statement that calls without brackets: the one before its first argument.
+fn called(code: &str, at: Range<usize>) -> Option<Range<usize>> {
+    let label =
+        |(k, c, depth): &(usize, char, usize)| *c == ':' && *depth == 0 && !code[at.start + k + 1..].starts_with('=');
+    let start = scan::levels(&code[at.clone()]).filter(label).last().map_or(at.start, |(k, ..)| at.start + k + 1);
+    let parts = scan::parts(code, start..at.end);
+    let first = parts.first()?.clone();
+    // Up to what is optional behind an argument.
+    let mut optional = false;
+    let is_outside = |(_, c, depth): &(usize, char, usize)| {
+        optional |= *c == '\\';
+        !optional && *depth == 0
+    };
+    let outside: BTreeSet<usize> =
+        scan::levels(&code[first.clone()]).filter(is_outside).map(|(k, ..)| first.start + k).collect();
+    let words: Vec<Range<usize>> = scan::words(&code[first.clone()])
+        .map(|w| first.start + w.start..first.start + w.end)
+        .filter(|word| outside.contains(&word.start) && !code[..word.start].ends_with('.'))
+        .collect();
+    let mut backwards = words.iter().rev();
+    let (last, before, third) = (backwards.next()?, backwards.next(), backwards.next());
+    if third.is_some_and(|word| handed::of(DECLARES, &code[word.clone()])) {
+        return None;
+    }
+    let is_call = |word: &&Range<usize>| {
+        let name = &code[(*word).clone()];
+        scan::is_name(name) && !handed::of(KEYWORDS, name) && !TYPES.iter().any(|t| t.eq_ignore_ascii_case(name))
+    };
+    let behind = code[last.end..first.end].trim_start();
+    // Behind `IF` and a condition stands the call.
+    let condition = third.is_some_and(|word| code[word.clone()].eq_ignore_ascii_case("IF"));
+    let is_argument =
+        !(condition && behind.starts_with('\\')) && (behind.is_empty() || behind.starts_with(['{', '(', '.', '\\']));
+    let is_apart = |word: &&Range<usize>| {
+        let gap = &code[word.end..last.start];
+        gap.starts_with(char::is_whitespace) && ["", "-", "+"].contains(&gap.trim())
+    };
+    let with_arguments = parts.len() > 1 || behind.starts_with(['[', '\\']);
+    let before = before.filter(|word| is_argument && is_apart(word) && is_call(word));
+    before.or(Some(last).filter(|word| with_arguments && is_call(word))).cloned()
+}
+
+/// Of these calls, each up to its end, those that may move, with their first argument and why they are not corrected:
+/// they are given a speed or a zone, or a target that is not corrected where it stands.
+fn unknown(
+    code: &str,
+    calls: Vec<(Range<usize>, usize)>,
+    is_corrected: impl Fn(Range<usize>) -> bool,
+) -> Vec<(Range<usize>, Range<usize>, Cause)> {
+    let headers = handed::headers(code, SYNTAX.routines);
+    let own: BTreeSet<String> = headers.iter().map(|(_, name)| code[name.clone()].to_ascii_uppercase()).collect();
+    let words: Vec<Range<usize>> = scan::words(code).collect();
+    let declared = words.windows(2).filter(|two| TYPES.iter().any(|t| t.eq_ignore_ascii_case(&code[two[0].clone()])));
+    let declared: BTreeSet<String> = declared.map(|two| code[two[1].clone()].to_ascii_uppercase()).collect();
+    let is_target = |at: &Range<usize>| {
+        let text = &code[at.clone()];
+        let first = scan::words(text).next().filter(|word| word.start == 0).unwrap_or(0..0);
+        let field = text[first.end..].starts_with('.');
+        let literal = text.starts_with("[[")
+            && text.ends_with(']')
+            && [2, 4].contains(&scan::parts(text, 1..text.len() - 1).len());
+        literal
+            || !field
+                && (handed::of(TARGETS, &text[first.clone()]) || declared.contains(&text[first].to_ascii_uppercase()))
+    };
+    let is_named = |at: &Range<usize>| scan::is_name(&code[at.clone()]) && !handed::of("TRUE FALSE", &code[at.clone()]);
+    let one = |(word, end): (Range<usize>, usize)| {
+        let name = &code[word.clone()];
+        let given: Vec<_> = scan::parts(code, word.end..end).into_iter().map(|part| values(code, part)).collect();
+        let mut paces = given.iter().filter_map(|values| values.first()).skip(1);
+        let has_pace = paces.any(|at| is_pace(&code[at.clone()]));
+        let any = |is: &dyn Fn(&Range<usize>) -> bool| given.iter().flatten().any(is);
+        let is_own = own.contains(&name.to_ascii_uppercase());
+        let cause = match () {
+            () if has_pace && is_own => Cause::Elsewhere,
+            () if has_pace => Cause::Unknown,
+            () if is_own || handed::of(READING, name) || handed::of(WRITING, name) => return None,
+            () if any(&|at| is_target(at) && !is_corrected(at.clone())) => Cause::Unknown,
+            () if begins(name, MOVE) && any(&is_named) && !any(&is_target) => Cause::Unknown,
+            () => return None,
+        };
+        let target = arguments(code, word.end..end).first().cloned().unwrap_or(word.end..word.end);
+        Some((word, target, cause))
+    };
+    calls.into_iter().filter_map(one).collect()
+}
+
+/// Whether an argument is one of the speeds or zones that the controller knows.
+fn is_pace(argument: &str) -> bool {
+    let numbered = |head: char| {
+        let mut chars = argument.chars();
         chars.next().is_some_and(|c| c.eq_ignore_ascii_case(&head))
             && chars.as_str().starts_with(|c: char| c.is_ascii_digit())
             && chars.all(|c| c.is_ascii_digit())
     };
-    let motion = |part: &Range<usize>| {
-        let text = code[part.clone()].split('\\').next().unwrap_or_default().trim();
-        text.eq_ignore_ascii_case("fine")
-            || text.eq_ignore_ascii_case("vmax")
-            || numbered(text, 'v')
-            || numbered(text, 'z')
+    handed::of("fine vmax", argument) || numbered('v') || numbered('z')
+}
+
+/// The values of an argument: its own, and those of what is optional before or behind it.
+fn values(code: &str, part: Range<usize>) -> Vec<Range<usize>> {
+    let optional = scan::levels(&code[part.clone()]).filter(|(_, c, depth)| *c == '\\' && *depth == 0);
+    let starts: Vec<usize> = optional.map(|(k, ..)| part.start + k).collect();
+    let ends = starts.iter().copied().chain([part.end]);
+    let pieces = std::iter::once(part.start).chain(starts.iter().map(|start| start + 1)).zip(ends);
+    let value = |(from, to): (usize, usize)| {
+        let named = code[from..to].find(":=").map_or(from, |k| from + k + 2);
+        scan::trimmed(code, named..to)
     };
-    parts.iter().skip(1).find(|part| motion(part))?;
-    // The word before the first argument: the last one but the argument's own.
-    let first = parts.first()?.clone();
-    let is_outside =
-        |word: &Range<usize>| scan::levels(&code[first.start..word.start]).last().is_none_or(|(.., depth)| depth == 0);
-    let words: Vec<Range<usize>> = scan::words(&code[first.clone()])
-        .map(|w| first.start + w.start..first.start + w.end)
-        .filter(|word| is_outside(word) && !code[..word.start].ends_with(['\\', '.']))
-        .collect();
-    let literal = code[..first.end].ends_with(']');
-    let word = words.iter().rev().nth(usize::from(!literal))?.clone();
-    Some((word, Some(Cause::Elsewhere)))
+    pieces.map(value).collect()
 }
 
 /// Arguments without switches (`\Conc`) and without what is optional behind them (`\NoEOffs`).

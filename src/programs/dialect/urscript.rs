@@ -1,7 +1,14 @@
 //! Universal Robots' language: lists of angles in rad.
+//!
+//! In: the text of a script. Out: its lists of joint angles, and its calls that move; among them those of functions of
+//! other files that get joint angles which no motion of this one has. What goes wrong: angles that are computed at run
+//! time.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
+use std::ops::Range;
 
+use crate::programs::handed;
 use crate::programs::instruction::{Cause, Instruction};
 use crate::programs::language::{Motion, Target, Written};
 use crate::programs::scan::{self, Number};
@@ -22,6 +29,14 @@ const PATHS: [(&str, Cause); 5] = [
     ("mc_load_path", Cause::Elsewhere),
     ("mc_run_motion", Cause::Elsewhere),
 ];
+/// Functions of the language that take lists of a joint's numbers, and move nothing; and words that are no calls.
+const STILL: &str = "if elif while and or not xor return struct get_forward_kin get_inverse_kin_has_solution get_inverse_kin_qnear \
+    is_within_safety_limits get_jacobian get_jacobian_time_derivative get_mass_matrix get_coriolis_and_centrifugal_torques \
+    norm normalize length size get_list_length textmsg popup assert str_cat to_str to_num dot cross transpose inv wrench_trans \
+    tool_contact set_target_payload set_payload force_mode_set_damping floor ceil sqrt socket_send_string socket_send_line \
+    socket_send_int socket_set_var rtde_set_watchdog write_output_float_register";
+/// What the names of functions that move have in them.
+const MOVE: &str = "move";
 /// Functions whose value is a pose, or joint angles that belong to one.
 const POSES: &str = "p[ get_inverse_kin get_actual_tcp_pose get_target_tcp_pose get_forward_kin pose_trans pose_add pose_sub \
     pose_inv interpolate_pose";
@@ -79,7 +94,7 @@ pub(super) fn written(before: &str, number: String, value: f64) -> String {
 pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
     let code = scan::code(text, "#");
     let variables = Variables::read(&code, SYNTAX, targets);
-    let mut found = Vec::new();
+    let (mut found, mut calls) = (Vec::new(), Vec::new());
     let mut last = "";
     for word in scan::words(&code) {
         let name = &code[word.clone()];
@@ -95,13 +110,32 @@ pub(super) fn motions(text: &str, targets: &[Target]) -> Vec<Instruction> {
             found.push(Instruction::new(text, word, open..open, Err(cause)));
             continue;
         }
-        let Some((_, count)) = MOVES.iter().find(|(move_, _)| *move_ == name) else { continue };
+        let Some((_, count)) = MOVES.iter().find(|(move_, _)| *move_ == name) else {
+            calls.push((word, arguments));
+            continue;
+        };
         let held = |at: &std::ops::Range<usize>| variables.expression(&code, unnamed(&code, at.clone()), targets);
         let moves_by =
             arguments.iter().take(*count).map(held).collect::<Result<Vec<_>, Cause>>().map(|all| all.concat());
         let shown = arguments[0].start..arguments[arguments.len().min(*count) - 1].end;
         found.push(Instruction::new(text, word, shown, moves_by));
     }
+    let corrected: BTreeSet<usize> = found.iter().flat_map(|m| m.moves_by.iter().flatten().copied()).collect();
+    let headers = handed::headers(&code, SYNTAX.routines);
+    let own: BTreeSet<&str> = headers.iter().map(|(_, name)| &code[name.clone()]).collect();
+    let moves = |(word, arguments): &(Range<usize>, Vec<Range<usize>>)| {
+        let name = &code[word.clone()];
+        let is_known = own.contains(name) || [STILL, POSES, DEGREES].iter().any(|known| handed::of(known, name));
+        let given = |at: &Range<usize>| match variables.expression(&code, unnamed(&code, at.clone()), targets) {
+            Ok(held) => held.iter().any(|k| !corrected.contains(k)),
+            Err(cause) => cause == Cause::Cartesian && name.to_ascii_lowercase().contains(MOVE),
+        };
+        !is_known && scan::is_name(name) && !code[..word.start].ends_with('.') && arguments.iter().any(given)
+    };
+    for (word, arguments) in calls.into_iter().filter(moves) {
+        found.push(Instruction::new(text, word, arguments[0].clone(), Err(Cause::Unknown)));
+    }
+    found.sort_by_key(|motion| motion.at);
     found
 }
 

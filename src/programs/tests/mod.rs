@@ -3,6 +3,7 @@
 use super::*;
 
 mod doubt;
+mod led;
 mod motions;
 mod written;
 
