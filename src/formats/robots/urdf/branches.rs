@@ -79,7 +79,10 @@ impl Urdf {
         };
         let usable = |link: &String| self.chain_to(link.clone()).is_ok();
         let candidates = ends.iter().filter(|e| !grips(e)).cloned().chain(ends.iter().map(before_fingers));
-        let rank = |link: &String| (self.moving(link).len(), FLANGES.iter().any(|flange| link.ends_with(flange)));
+        let rolls = |link: &String| link.to_lowercase().contains("wheel");
+        let rank = |link: &String| {
+            (self.moving(link).len(), !rolls(link), FLANGES.iter().any(|flange| link.ends_with(flange)))
+        };
         // A hand alone has nothing but fingers.
         let best = candidates.filter(usable).max_by_key(rank);
         best.or_else(|| ends.iter().filter(|end| usable(end)).max_by_key(|end| rank(end)).cloned())
