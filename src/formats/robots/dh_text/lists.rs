@@ -87,7 +87,17 @@ pub(super) fn links(plain: &Lists, families: &BTreeMap<String, Lists>) -> Result
 }
 
 /// What lists of two parameters lack of the three that every table has.
-pub(super) fn incomplete(lists: &Lists) -> Option<Wrong> {
+pub(super) fn incomplete(lists: &Lists, families: &BTreeMap<String, Lists>) -> Option<Wrong> {
+    let whole = families.iter().filter(|(_, lists)| [0, 1, 3].iter().all(|&which| lists[which].is_some()));
+    if let [(one, _), (other, lists), ..] = whole.collect::<Vec<_>>()[..] {
+        let line = lists[0].as_ref().map_or(1, |(line, _)| *line);
+        return Some((
+            line,
+            format!(
+                "lists of several robots stand here, `{one}` and `{other}`, and which is meant is not said: leave one of them in the file"
+            ),
+        ));
+    }
     const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
     let (here, lack): (Vec<usize>, Vec<usize>) = [0, 1, 3].into_iter().partition(|which| lists[*which].is_some());
     let ([one, other], [lack]) = (&here[..], &lack[..]) else { return None };
