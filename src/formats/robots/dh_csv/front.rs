@@ -70,10 +70,9 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         return Err(empty(path).refuse(line, what, Some(ur_calibration::HINT)));
     }
     if let (Some(links), None) = (&read.links, &given) {
-        return match longer_table(path, &text, links, asked) {
-            Some(ways) if is(&PROSE) => Ok(ways),
-            _ => Ok(vec![of_links(path, &read, links, asked)?]),
-        };
+        let is_example = is(&PROSE) && !links.calls && !links.of_lists;
+        let table = is_example.then(|| longer_table(path, &text, links, asked)).flatten();
+        return table.map_or_else(|| Ok(vec![of_links(path, &read, links, asked)?]), Ok);
     }
     let width = given.as_ref().map_or(4, Vec::len);
     let mut matrix = dh_text::matrix(&text, &read.known, width).map_err(refuse)?;
@@ -215,9 +214,14 @@ fn ways(table: &Table) -> Result<Vec<Reading>> {
 fn without_names(table: &Table) -> Result<Vec<Reading>> {
     let rows = table.rows;
     // Columns of words and of the joint's number are no parameters.
-    let is_number = |c: usize| rows.iter().all(|(_, r)| table.theta(&r[c]).is_some());
-    let free: Vec<usize> =
-        (0..rows[0].1.len()).filter(|&c| is_number(c) && !(table.counts(c) && rows.len() > 2)).collect();
+    let is_number = |c: &usize| rows.iter().all(|(_, r)| table.value(&r[*c]).is_some());
+    // `A3` may be the label of a row, too.
+    let is_axis = |c: &usize| rows.iter().all(|(_, r)| table.theta(&r[*c]).is_some());
+    let counts = |c: &usize| table.counts(*c) && rows.len() > 2;
+    let mut free: Vec<usize> = (0..rows[0].1.len()).filter(|c| is_number(c) && !counts(c)).collect();
+    if free.len() == 3 {
+        free = (0..rows[0].1.len()).filter(|c| is_axis(c) && !counts(c)).collect();
+    }
     let [w, x, y, z] = free[..] else {
         let message = format!("{} columns of numbers without names; four are needed", free.len());
         let width = rows[0].1.len();

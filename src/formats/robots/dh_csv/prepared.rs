@@ -21,11 +21,11 @@ pub(super) fn of_unit(cell: &str) -> Option<(&str, Unit)> {
     number.trim().parse::<f64>().ok().map(|_| (number.trim(), unit))
 }
 
+/// Names of columns, and rows.
+type Named<'a> = (Cow<'a, [String]>, Cow<'a, [(u64, Fields)]>);
+
 /// Names and rows with the units of cells in the names.
-pub(super) fn without_units<'a>(
-    table: &Table<'a>,
-    names: &'a [String],
-) -> Result<(Cow<'a, [String]>, Cow<'a, [(u64, Fields)]>)> {
+pub(super) fn without_units<'a>(table: &Table<'a>, names: &'a [String]) -> Result<Named<'a>> {
     let (mut names, mut rows) = (Cow::Borrowed(names), Cow::Borrowed(table.rows));
     for column in 0..names.len() {
         let of = |row: &(u64, Fields)| of_unit(&row.1[column]).map(|(_, unit)| unit);
@@ -64,7 +64,7 @@ pub(super) fn without_units<'a>(
 pub(super) fn lacks_theta(table: &Table, names: &[String]) -> Result<bool> {
     let Some([alpha, a, d]) = names::without_theta(names) else { return Ok(false) };
     let is_other = |column: &usize| ![alpha, a, d].contains(column) && names[*column] != "-";
-    let moves = |column: usize| table.rows.iter().any(|(_, row)| table.theta(&row[column]).is_some_and(|v| v.variable));
+    let moves = |column: usize| table.rows.iter().any(|(_, row)| table.value(&row[column]).is_some_and(|v| v.variable));
     Ok(table.beside([alpha, a, a, d])?.left_out.is_empty() && !(0..names.len()).filter(is_other).any(moves))
 }
 

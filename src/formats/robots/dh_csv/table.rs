@@ -82,7 +82,7 @@ impl Table<'_> {
 
     /// Whether a row names a joint's variable in any of its cells.
     pub fn has_variable(&self, at: usize) -> bool {
-        self.rows[at].1.iter().any(|cell| self.theta(cell).is_some_and(|v| v.variable))
+        self.rows[at].1.iter().any(|cell| self.value(cell).is_some_and(|v| v.variable))
     }
 
     /// The rows of joints: where some have the joint's variable for theta, rows at the end without one are the flange

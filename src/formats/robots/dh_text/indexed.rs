@@ -44,6 +44,12 @@ pub(super) fn element(list: &str, number: usize) -> String {
     format!("{list}__{number}")
 }
 
+/// Where the bracket of a list opens that a value is, at most behind a call's name.
+pub(super) fn opening(value: &str) -> Option<usize> {
+    let mut head = value.char_indices().take(60).take_while(|(_, c)| !matches!(c, '\n' | ';' | ','));
+    head.find(|(_, c)| matches!(c, '[' | '{')).map(|(at, _)| at)
+}
+
 /// The text with elements as they stood there.
 pub(super) fn shown(text: &str) -> String {
     let mut pieces = text.split("__");
@@ -87,10 +93,7 @@ fn lists(text: &str) -> BTreeSet<&str> {
         let name = &before[before
             .rfind(|c| !is_part(c))
             .map_or(0, |at| at + before[at..].chars().next().map_or(1, char::len_utf8))..];
-        let Some(open) = value.find(['[', '{']).filter(|open| *open < 30 && !value[..*open].contains(['\n', ';', ',']))
-        else {
-            continue;
-        };
+        let Some(open) = opening(value) else { continue };
         let inside = value[open + 1..].split([']', '}']).next().unwrap_or("");
         let moves = inside.chars().any(|c| c.is_ascii_digit() && c != '0');
         let is_theta = name.to_lowercase().starts_with("th") || name.starts_with('\u{3b8}');

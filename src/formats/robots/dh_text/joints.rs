@@ -105,7 +105,9 @@ fn values(code: &str) -> impl Iterator<Item = (u64, &str, &str)> {
 /// A list's inside and what follows its bracket.
 fn bracketed(value: &str) -> Option<(&str, &str)> {
     let value = value.trim_start_matches([' ', '\t', '\n']);
-    let open = value.find(['[', '{', '(']).filter(|open| *open < 30 && !value[..*open].contains(['\n', ';', ',']))?;
+    let open = value
+        .find(['[', '{', '(', '\n', ';', ','])
+        .filter(|open| *open < 30 && value[*open..].starts_with(['[', '{', '(']))?;
     let inside = &value[open + 1..];
     let end = up_to(inside, &[]);
     let behind = inside.get(end + 1..)?;

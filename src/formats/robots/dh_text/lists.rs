@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use super::indexed::opening;
 use super::link::{KEYS, Known, Link, Wrong};
 use crate::robot::catalogue::Convention;
 use crate::tables::expression::{Value, evaluate};
@@ -18,7 +19,7 @@ const OTHERS: [&str; 9] = ["delta", "error", "err", "std", "min", "max", "lim", 
 /// none.
 pub(super) fn list(value: &str, known: &Known) -> Option<Vec<Value>> {
     let value = value.trim_start();
-    let open = value.find(['[', '{'])?;
+    let open = opening(value)?;
     let head = value[..open].trim();
     let turned = head.trim_end_matches('(').rsplit('.').next().is_some_and(|f| matches!(f, "deg2rad" | "radians"));
     if !(head.is_empty() || head.ends_with('(') && head.len() < 30) || head.contains(['\n', ',', ';']) {

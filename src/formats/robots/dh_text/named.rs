@@ -67,6 +67,9 @@ fn of_block(code: &str, at: usize) -> Option<String> {
     let own = at - start;
     let mut first = start;
     if !is_item(&code[start..]) {
+        if own == 0 {
+            return None;
+        }
         for line in code[..start].lines().rev() {
             first -= line.len() + 1;
             if line.trim().is_empty() || indent(line) >= own {
@@ -136,7 +139,9 @@ pub(super) fn said(links: &[Link]) -> Vec<String> {
 pub(super) fn of_one_list(links: &[Link]) -> Result<(), Wrong> {
     let mut lists: BTreeMap<usize, (u64, &str, usize)> = BTreeMap::new();
     let still = still(links);
-    for (link, _) in links.iter().zip(still).filter(|(link, still)| !link.call && !still) {
+    // A lone key is one of something else.
+    let is_one = |(link, still): &(&Link, bool)| !link.call && !still && link.values.iter().flatten().count() > 1;
+    for (link, _) in links.iter().zip(still).filter(is_one) {
         if let Some((at, name)) = &link.of {
             lists.entry(*at).or_insert((link.line, name, 0)).2 += 1;
         }

@@ -63,7 +63,7 @@ fn lists_of_kinds_of_other_joints_are_refused_and_other_lists_are_none() {
 /// Links of a dictionary: the first `joints` in its list, the others by name.
 fn dictionary(joints: usize, named: &[&str]) -> String {
     let link = |k: usize| {
-        format!("{{\"alpha\": {}, \"a\": 0.{k}, \"d\": 0.{}, \"theta\": 0.{}}}", [1.57079633, 0.0][k % 2], k + 1, k % 3)
+        format!("{{\"alpha\": {}, \"a\": 0.{k}, \"d\": 0.{}, \"theta\": 0.{}}}", ["pi/2", "0"][k % 2], k + 1, k % 3)
     };
     let list: Vec<String> = (0..joints).map(link).collect();
     let named: String = named.iter().zip(joints..).map(|(name, k)| format!(",\n \"{name}\": {}", link(k))).collect();
@@ -86,9 +86,7 @@ fn a_link_that_is_a_tool_by_its_name_holds_still() {
         // As all joints, those of the tool at zero.
         let mut all = one("arm.json", &dictionary(joints + tools.len(), &[]));
         all.flange = all.rows.split_off(joints);
-        for column in [&mut all.limits_deg] {
-            column.truncate(joints);
-        }
+        all.limits_deg.truncate(joints);
         let apart = at(&found).inverse() * at(&all);
         assert!(apart.translation.vector.norm() < 1e-9 && apart.rotation.angle() < 1e-9);
     }
@@ -110,8 +108,8 @@ fn a_link_that_is_a_tool_by_its_name_holds_still() {
         assert_eq!((found.rows.len(), found.base.len()), (joints, base), "{names:?}");
     }
     let fixed = dictionary(4, &[]).replacen(
-        "{\"alpha\": 1.57079633, \"a\": 0.2",
-        "{\"type\": \"fixed\", \"alpha\": 1.57079633, \"a\": 0.2",
+        "{\"alpha\": pi/2, \"a\": 0.2",
+        "{\"type\": \"fixed\", \"alpha\": pi/2, \"a\": 0.2",
         1,
     );
     assert!(said("arm.json", &fixed).contains("row 3 holds still"));
