@@ -173,7 +173,8 @@ fn runs(read: &[(usize, Line)]) -> Vec<std::ops::Range<usize>> {
     for (at, (depth, line)) in read.iter().enumerate() {
         match line {
             Line::Row(_) | Line::Broken(_) => {
-                match runs.last_mut().filter(|_| open) {
+                // Behind the bracket that ends a table another begins.
+                match runs.last_mut().filter(|run| open && *depth >= read[run.end - 1].0) {
                     Some(run) => run.end = at + 1,
                     None => runs.push(at..at + 1),
                 }

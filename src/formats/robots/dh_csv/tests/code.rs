@@ -268,6 +268,7 @@ fn lists_of_a_structure_and_tables_without_theta() {
     let columns = |columns| Asked { columns: Some(columns), ..Asked::default() };
     for (text, asked) in [
         (format!("dh = [\n{tuples}]\n"), columns("a,alpha,d")),
+        (format!("dh = [\n{tuples}]\ngrip = np.array([0, 0, 0.12])\n"), columns("a,alpha,d")),
         (format!("# rows of {{a, alpha, d}}\ndh = [\n{tuples}]\n"), Asked::default()),
     ] {
         assert_eq!(of("arm.py", &text, asked).unwrap()[0].rows, found.rows, "{text}");
