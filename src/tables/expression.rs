@@ -22,6 +22,9 @@ const TO_RADIANS: [&str; 4] = ["radians", "rad", "toradians", "to_radians"];
 /// Functions that do, and numbers to multiply with.
 const PER_DEGREE: [&str; 6] = ["deg2rad", "d2r", "degtorad", "deg_to_rad", "dtor", "to_rad"];
 
+/// Functions that turn radians into degrees.
+const TO_DEGREES: [&str; 4] = ["rad2deg", "degrees", "radtodeg", "todegrees"];
+
 /// Functions of numbers, whose arguments may be angles and whose values are none.
 type Function = fn(f64) -> f64;
 const FUNCTIONS: [(&str, Function); 4] = [("sin", f64::sin), ("cos", f64::cos), ("tan", f64::tan), ("sqrt", f64::sqrt)];
@@ -55,11 +58,21 @@ pub fn counted_back(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option
     with_slope(text, known).filter(|(value, slope)| value.variable && *slope < 0.0).map(|(value, _)| value)
 }
 
+/// The number of the joint's variable that a formula holds, `q3`, `theta_3`.
+pub fn number_of_variable(text: &str) -> Option<usize> {
+    let text = plain(text);
+    let none = |_: &str| None;
+    let mut parser =
+        Parser { rest: text.trim(), known: &none, reading: 0.0, radians: false, variable: false, number: None };
+    parser.sum(0)?;
+    parser.number
+}
+
 /// A formula's value, and what a joint's variable in it is multiplied with.
 fn with_slope(text: &str, known: &dyn Fn(&str) -> Option<Value>) -> Option<(Value, f64)> {
     let plain = plain(text);
     let at = |reading: f64| {
-        let mut parser = Parser { rest: plain.trim(), known, reading, radians: false, variable: false };
+        let mut parser = Parser { rest: plain.trim(), known, reading, radians: false, variable: false, number: None };
         let number = parser.sum(0)?;
         let whole = parser.rest.trim_start().is_empty() && number.is_finite();
         whole.then_some(Value { number, radians: parser.radians, variable: parser.variable })
@@ -78,6 +91,19 @@ fn plain(text: &str) -> std::borrow::Cow<'_, str> {
     ["<sub>", "</sub>", "\\", "$"].iter().fold(text.to_owned(), |text, mark| text.replace(mark, "")).into()
 }
 
+/// The formula with `q3` for a letter with a number, `d3` or `A3`, which is a joint's variable in its place.
+pub fn of_reading(text: &str, letter: char) -> String {
+    let mut plain = String::with_capacity(text.len());
+    let mut before = ' ';
+    for (at, c) in text.char_indices() {
+        let behind = text[at + c.len_utf8()..].trim_start_matches(['_', '{']);
+        let is_it = c == letter && !(before.is_alphanumeric() || matches!(before, '_' | '.'));
+        plain.push(if is_it && behind.starts_with(|c: char| c.is_ascii_digit()) { 'q' } else { c });
+        before = c;
+    }
+    plain
+}
+
 struct Parser<'a> {
     rest: &'a str,
     known: &'a dyn Fn(&str) -> Option<Value>,
@@ -85,6 +111,8 @@ struct Parser<'a> {
     reading: f64,
     radians: bool,
     variable: bool,
+    /// The number of the joint's variable.
+    number: Option<usize>,
 }
 
 impl Parser<'_> {
@@ -92,7 +120,7 @@ impl Parser<'_> {
         let rest = self.rest.trim_start();
         match rest.strip_prefix(sign) {
             // `**` is a power, which no table needs.
-            Some(behind) if !behind.starts_with('*') => {
+            Some(behind) if sign != '*' || !behind.starts_with('*') => {
                 self.rest = behind;
                 true
             }
@@ -183,12 +211,19 @@ impl Parser<'_> {
 
     /// A function of what stands in its brackets, the first of which was read; none of a joint's variable, for which no
     /// number stands.
-    fn applied(&mut self, function: Function, depth: usize) -> Option<f64> {
+    fn called(&mut self, name: &str, depth: usize) -> Option<f64> {
         let (radians, variable) = (self.radians, std::mem::take(&mut self.variable));
         let inside = self.sum(depth + 1)?;
+        let of_two = name == "atan2";
+        let second = if of_two && self.takes(',') { self.sum(depth + 1) } else { None };
         let is_number = self.takes(')') && !self.variable;
-        (self.radians, self.variable) = (radians, variable);
-        is_number.then(|| function(inside))
+        (self.radians, self.variable) = (radians || of_two, variable);
+        let function = FUNCTIONS.iter().find(|(known, _)| *known == name).map(|(_, function)| function);
+        match function.filter(|_| is_number) {
+            Some(function) => Some(function(inside)),
+            None if of_two => second.filter(|_| is_number).map(|x| inside.atan2(x)),
+            None => is_number.then(|| inside.to_degrees()),
+        }
     }
 
     fn name(&mut self, depth: usize) -> Option<f64> {
@@ -205,10 +240,11 @@ impl Parser<'_> {
             self.radians = true;
             return self.takes(')').then(|| degrees.to_radians());
         }
-        if let Some((_, function)) = FUNCTIONS.iter().find(|(name, _)| *name == lower)
-            && self.takes('(')
+        if rest.trim_start().starts_with('(')
+            && (TO_DEGREES.contains(&lower.as_str()) || lower == "atan2" || FUNCTIONS.iter().any(|(n, _)| *n == lower))
         {
-            return self.applied(*function, depth);
+            self.takes('(');
+            return self.called(&lower, depth);
         }
         if let Some((_, part)) = OF_PI.iter().find(|(name, _)| *name == lower) {
             self.radians = true;
@@ -227,6 +263,7 @@ impl Parser<'_> {
         let is_variable = VARIABLES.contains(&letters.to_lowercase().as_str());
         is_variable.then(|| {
             self.variable = true;
+            self.number = plain[letters.len()..].trim_matches(['_', '{', '}', '*']).parse().ok();
             // `th5* + 90`: a star marks it.
             let behind = self.rest.trim_start().strip_prefix('*').map(str::trim_start);
             if let Some(behind) = behind.filter(|b| b.is_empty() || b.starts_with(['+', '-', '\u{2212}'])) {
@@ -268,6 +305,7 @@ mod tests {
             "quarter",
             "-(-pi)/2",
             "0.5pi",
+            "(90/180)*pi",
         ] {
             let (number, radians, variable) = of(text).unwrap();
             assert!((number - PI / 2.0).abs() < 1e-12 && radians && !variable, "{text}");
@@ -291,6 +329,31 @@ mod tests {
         }
         let (sine, radians, _) = of("0.2 + sin(pi/6)/np.sqrt(4) * 2").unwrap();
         assert!((sine - 0.7).abs() < 1e-12 && !radians);
+    }
+
+    #[test]
+    fn functions_of_angles_and_letters_of_variables() {
+        let of = |text: &str| evaluate(text, &|_| None).map(|v| (v.number, v.radians, v.variable));
+        for (text, number, radians) in [
+            ("rad2deg(-pi/2)", -90.0, false),
+            ("np.degrees(math.pi)", 180.0, false),
+            ("math.atan2(-1, 1)", -PI / 4.0, true),
+            ("2*atan2(0.3, 0.3) - pi", -PI / 2.0, true),
+        ] {
+            let found = of(text).unwrap();
+            assert!((found.0 - number).abs() < 1e-12 && found.1 == radians && !found.2, "{text} {found:?}");
+        }
+        assert_eq!([of("atan2(1)"), of("atan2(q1, 1)")], [None, None]);
+        for (text, number) in
+            [("q3 - 90", Some(3)), ("-theta_{2}", Some(2)), ("q_0", Some(0)), ("q", None), ("3", None)]
+        {
+            assert_eq!(number_of_variable(text), number, "{text}");
+        }
+        let of_reading =
+            |text: &str, letter| of(&of_reading(text, letter)).map(|(number, _, variable)| (number, variable));
+        assert_eq!(of_reading("d3 + 0.2", 'd'), Some((0.2, true)));
+        assert_eq!(of_reading("A3 - 90", 'A'), Some((-90.0, true)));
+        assert_eq!([of_reading("add3", 'd'), of_reading("A", 'A'), of_reading("d", 'd')], [None; 3]);
     }
 
     #[test]

@@ -8,10 +8,12 @@
 //! numbers rule out; refused with the line.
 
 mod beside;
+mod document;
 mod front;
 mod latex;
 mod names;
 mod offsets;
+mod prepared;
 mod reading;
 mod table;
 mod units;

@@ -12,9 +12,12 @@ mod added;
 mod calls;
 mod comments;
 mod ends;
+mod indexed;
+mod joints;
 mod link;
 mod lists;
 mod matrix;
+mod named;
 mod repeated;
 mod robots;
 mod scan;
@@ -22,6 +25,8 @@ mod scan;
 mod tests;
 
 pub use self::ends::End;
+pub use self::indexed::indexed;
+pub use self::joints::Said;
 pub use self::matrix::{Matrix, matrix};
 
 use self::link::Link;
@@ -42,6 +47,8 @@ pub struct Text {
     pub known: Known,
     /// What lists of parameters lack to be links.
     pub incomplete: Option<Wrong>,
+    /// What lists beside the parameters say of the joints.
+    pub joints: Said,
 }
 
 /// Links that a text names the parameters of.
@@ -53,8 +60,12 @@ pub struct Links {
     pub convention: Option<(Convention, &'static str)>,
     pub contradiction: Option<String>,
     pub slides: Vec<bool>,
+    /// Which rows are none of joints, before the first or behind the last.
+    pub still: Vec<bool>,
     /// Which joints count the other way.
     pub flipped: Vec<bool>,
+    /// Whether lists or parameters with numbers make them.
+    pub of_lists: bool,
     /// Whether calls of a toolbox make them, which are classic where nothing says otherwise.
     pub calls: bool,
     pub limits: Vec<Option<[Value; 2]>>,
@@ -84,12 +95,19 @@ pub fn read(text: &str, prose: bool) -> Result<Text, Wrong> {
         repeated::refuse_unwritten(&code, &scan.links)?;
     }
     robots::of_one(&code, &scan.links.iter().map(|link| link.line).collect::<Vec<_>>())?;
-    let (known, incomplete) = (std::mem::take(&mut scan.known), lists::incomplete(&scan.lists));
+    named::of_one_list(&scan.links)?;
+    let (known, incomplete) = (std::mem::take(&mut scan.known), lists::incomplete(&scan.lists, &scan.families));
+    let joints = if prose { Said::default() } else { joints::said(&code, &known)? };
     let mut links = links(scan, lower.contains("qlim"))?;
     if let Some(links) = links.as_mut().filter(|links| links.calls) {
-        (links.ends, links.ends_said) = ends::of(&code, &known);
+        let (ends, said) = ends::of(&code, &known);
+        links.ends = ends;
+        links.ends_said.extend(said);
     }
-    Ok(Text { links, words, known, incomplete })
+    if let Some(links) = links.as_mut() {
+        links.told(&joints)?;
+    }
+    Ok(Text { links, words, known, incomplete, joints })
 }
 
 /// The links of what was read; none where there are fewer than two.
@@ -100,7 +118,7 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
         Ok(if of_lists.is_empty() { lists::numbered_links(&numbered) } else { (of_lists, None) })
     };
     // What a loop takes out of lists is no number where the link is made.
-    if let Some(wrong) = wrong {
+    if let Some(wrong) = wrong.or_else(|| links.iter().find_map(Link::unsaid)) {
         links = Vec::new();
         if others()?.0.len() < 2 {
             return Err(wrong);
@@ -115,7 +133,8 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
         }
     }
     let mut shown = None;
-    if links.len() < 2 {
+    let of_lists = links.len() < 2;
+    if of_lists {
         (links, shown) = others()?;
     }
     if links.len() < 2 {
@@ -130,14 +149,31 @@ fn links(scan: Scan, limited: bool) -> Result<Option<Links>, Wrong> {
         rows: rows.collect::<Result<_, Wrong>>()?,
         contradiction,
         slides: links.iter().map(|link| link.slides).collect(),
+        still: named::still(&links),
         flipped: links.iter().map(|link| link.flipped).collect(),
         convention: of_calls
             .map(|c| (c, "the calls that make its links say so"))
             .or(shown.map(|c| (c, "alpha and a are numbered from 0, d from 1"))),
+        of_lists,
         calls: links.iter().any(|link| link.call),
         limits: links.iter().map(|link| link.limits).collect(),
         limited,
         ends: [None; 2],
-        ends_said: Vec::new(),
+        ends_said: named::said(&links),
     }))
+}
+
+impl Links {
+    /// Takes from a list which joints slide, and says which offsets stand apart.
+    fn told(&mut self, joints: &Said) -> Result<(), Wrong> {
+        let said = self.slides.contains(&true);
+        if let Some(slides) = joints.slides(self.rows.len(), &self.still)? {
+            if said && slides != self.slides {
+                let (line, name) = joints.kinds.as_ref().map_or((1, ""), |kinds| (kinds.line, &kinds.name));
+                return Err((line, format!("`{name}` says of other joints that they slide than the links do")));
+            }
+            self.slides = slides;
+        }
+        Ok(())
+    }
 }

@@ -13,7 +13,7 @@ use nalgebra::{Point3, Vector3};
 use super::ExportedRobot;
 use crate::diagnostic::count;
 use crate::files::{self, Result};
-use crate::formats::robots::urdf::{of_origin, roll_pitch_yaw};
+use crate::formats::robots::urdf::{beyond, of_origin, roll_pitch_yaw};
 use crate::geometry::Transform;
 use crate::progress;
 use crate::robot::Robot;
@@ -27,12 +27,6 @@ const NUMBERS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
 
 /// Words before the number of a joint, `joint_1`.
 const COUNTED: [&str; 3] = ["joint", "link", "axis"];
-
-/// The longest offset in metres: longer ones are mm.
-const MOST_M: f64 = 10.0;
-
-/// The largest angle in radians, two turns: larger ones are degrees.
-const MOST_RAD: f64 = 2.0 * std::f64::consts::TAU;
 
 /// A line and what is wrong there.
 type Wrong = (u64, String);
@@ -133,11 +127,8 @@ fn origin(frame: &Frame) -> std::result::Result<Transform, Wrong> {
         return Err(wrong(format!("has no `{}`", NUMBERS[lacks])));
     }
     let [x, y, z, roll, pitch, yaw] = frame.numbers.map(Option::unwrap_or_default);
-    let largest = |numbers: [f64; 3]| numbers.iter().fold(0.0f64, |most, v| most.max(v.abs()));
-    let (m, rad) = (largest([x, y, z]), largest([roll, pitch, yaw]));
-    if m > MOST_M || rad > MOST_RAD {
-        let (v, unit, other) = if m > MOST_M { (m, "m", "mm") } else { (rad, "rad", "degrees") };
-        return Err(wrong(format!("has {v}, which is no {unit} of a robot: these are {other}")));
+    if let Some(beyond) = beyond([x, y, z], [roll, pitch, yaw]) {
+        return Err(wrong(beyond));
     }
     Ok(of_origin([x, y, z], [roll, pitch, yaw]))
 }

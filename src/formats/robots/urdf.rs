@@ -10,6 +10,7 @@ use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 use roxmltree::{Document, Node};
 
+use crate::diagnostic::count;
 use crate::files::{self, Result};
 use crate::geometry::Transform;
 use crate::programs::edited;
@@ -49,6 +50,8 @@ pub struct UrdfJoint {
     /// Range: rad, of a sliding joint mm.
     pub limits_rad: Option<(f64, f64)>,
     pub line: u64,
+    /// What is wrong with the numbers of its origin, where they are in other units.
+    beyond: Option<String>,
     /// Where its `<joint>` element's `<origin>` stands in the text, or where one would be put.
     origin_at: Result<std::ops::Range<usize>, usize>,
 }
@@ -134,8 +137,8 @@ impl Urdf {
     }
 
     /// The joints from the root to the link `tip`, or to the flange where none is named.
-    pub fn chain(&self, tip: Option<&str>) -> Result<Chain<'_>> {
-        let tip = match tip {
+    pub fn chain(&self, named: Option<&str>) -> Result<Chain<'_>> {
+        let tip = match named {
             Some(tip) => tip.to_owned(),
             None => {
                 let tip = self.flange()?;
@@ -143,6 +146,18 @@ impl Urdf {
                 tip
             }
         };
+        let chain = self.chain_to(tip)?;
+        if named.is_none() {
+            let (root, tip, joints) = (&self.root, &chain.tip, count(chain.moving().count(), "joint"));
+            progress::note(format!(
+                "{}: from link `{root}` to link `{tip}`, {joints}; `--tip LINK` takes another end",
+                self.path
+            ));
+        }
+        Ok(chain)
+    }
+
+    fn chain_to(&self, tip: String) -> Result<Chain<'_>> {
         let mut joints = Vec::new();
         let mut link = tip.as_str();
         while link != self.root {
@@ -179,6 +194,11 @@ impl Urdf {
             };
             let message = format!("joint `{}` {what}; joints that turn or slide on their own were needed", joint.name);
             return Err(self.refuse(Some(joint.line), message, instead(position)));
+        }
+        if let Some((joint, beyond)) = joints.iter().find_map(|j| Some((j, j.beyond.as_ref()?))) {
+            let message = format!("the origin of joint `{}` {beyond}", joint.name);
+            let hint = "a URDF is in m and rad: `xyz` in metres, `rpy` in radians".to_owned();
+            return Err(self.refuse(Some(joint.line), message, Some(hint)));
         }
         if !joints.iter().any(|j| moves(j)) {
             let hint = format!("the links at the ends are {}", self.ends().join(", "));
@@ -241,6 +261,24 @@ pub fn roll_pitch_yaw(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     [roll + 0.0, pitch + 0.0, yaw + 0.0]
 }
 
+/// The longest offset in metres: longer ones are mm.
+const MOST_M: f64 = 10.0;
+
+/// The largest angle in radians, two turns: larger ones are degrees.
+const MOST_RAD: f64 = 2.0 * std::f64::consts::TAU;
+
+/// What is wrong with an origin whose numbers are not in m and rad.
+pub(super) fn beyond(xyz_m: [f64; 3], rpy_rad: [f64; 3]) -> Option<String> {
+    let largest = |numbers: [f64; 3]| numbers.iter().fold(0.0f64, |most, v| most.max(v.abs()));
+    let (m, rad) = (largest(xyz_m), largest(rpy_rad));
+    let (v, unit, other) = match (m > MOST_M, rad > MOST_RAD) {
+        (true, _) => (m, "m", "mm"),
+        (_, true) => (rad, "rad", "degrees"),
+        _ => return None,
+    };
+    Some(format!("has {v}, which is no {unit} of a robot: these are {other}"))
+}
+
 /// The transform of an origin, metres and roll, pitch, yaw in radians.
 pub fn of_origin(xyz_m: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> Transform {
     let turn = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
@@ -277,7 +315,8 @@ fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
             .filter(|v| v.iter().all(|v| v.is_finite()))
             .ok_or_else(|| format!("joint `{name}`: {attribute}=\"{text}\" is not three numbers"))
     };
-    let parent_from_joint = of_origin(numbers("origin", "xyz", [0.0; 3])?, numbers("origin", "rpy", [0.0; 3])?);
+    let (xyz, rpy) = (numbers("origin", "xyz", [0.0; 3])?, numbers("origin", "rpy", [0.0; 3])?);
+    let parent_from_joint = of_origin(xyz, rpy);
     let axis = Vector3::from(numbers("axis", "xyz", [1.0, 0.0, 0.0])?);
     if kind != Kind::Fixed && axis.norm() == 0.0 {
         return Err(format!("joint `{name}` has an axis of length zero"));
@@ -308,6 +347,7 @@ fn joint(node: &Node, line: u64) -> std::result::Result<UrdfJoint, String> {
         axis: if axis.norm() > 0.0 { axis.normalize() } else { Vector3::x() },
         limits_rad,
         line,
+        beyond: beyond(xyz, rpy),
         origin_at: child_named("origin").map(|n| n.range()).ok_or(start_tag_end),
         name,
     })

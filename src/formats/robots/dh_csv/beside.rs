@@ -107,11 +107,30 @@ impl Table<'_> {
         self.only(&is_of_kind)
     }
 
+    /// Whether the column of the joints' kinds says that a row holds still.
+    pub(super) fn is_fixed(&self, at: usize) -> bool {
+        let word = |column: usize| self.rows[at].1[column].trim().trim_matches(['"', '\'']);
+        self.kind().is_some_and(|column| word(column).eq_ignore_ascii_case("fixed"))
+    }
+
     /// Which rows are of joints that slide. A column of other words, of motors for one, says nothing of it.
     pub(super) fn sliding(&self) -> Result<Vec<bool>> {
         let kind = self.kind();
-        let of_row = |(_, row): &(u64, Fields)| kind.and_then(|column| slides(&row[column]));
-        let said: Vec<Option<bool>> = self.rows.iter().map(of_row).collect();
+        if let Some(said) = self.joints.filter(|_| kind.is_none()) {
+            let any = (0..self.rows.len()).any(|at| self.has_variable(at));
+            let still: Vec<bool> = (0..self.rows.len())
+                .map(|at| self.still.get(at) == Some(&true) || any && !self.has_variable(at))
+                .collect();
+            let of_list = said.slides(self.rows.len(), &still);
+            let hint = Some("a word for each row: revolute (R, 0) or prismatic (P, 1)");
+            if let Some(slides) = of_list.map_err(|(line, message)| self.grid.refuse(line, message, hint))? {
+                return Ok(slides);
+            }
+        }
+        let of_row = |(at, (_, row)): (usize, &(u64, Fields))| {
+            kind.and_then(|column| if self.is_fixed(at) { Some(false) } else { slides(&row[column]) })
+        };
+        let said: Vec<Option<bool>> = self.rows.iter().enumerate().map(of_row).collect();
         let unknown = said.iter().position(Option::is_none).filter(|_| said.iter().any(Option::is_some));
         if let (Some(at), Some(column)) = (unknown, kind) {
             let (line, row) = &self.rows[at];

@@ -1,14 +1,15 @@
 //! The table of a file, whatever it is: a sheet, a text of rows, a document with a table in it, a program or settings.
 
-use std::borrow::Cow;
-
 use camino::Utf8Path;
 
+use super::document::{alone, without_entities};
 use super::latex;
-use super::names::HINT;
+use super::names::{HINT, named};
 use super::offsets;
+use super::prepared;
 use super::reading::{Reading, reading};
 use super::table::Table;
+use super::units::is_turn;
 use crate::files::{self, Result};
 use crate::formats::robots::dh_text::{self, Known, Links, Text};
 use crate::formats::robots::dh_words::Words;
@@ -35,20 +36,11 @@ const ORDERS: [[usize; 4]; 4] = [[0, 1, 3, 2], [0, 1, 2, 3], [1, 0, 3, 2], [2, 3
 /// Extensions of files that are tables whatever stands in them.
 const TABLES: [&str; 5] = ["csv", "tsv", "xlsx", "xls", "ods"];
 
+/// Extensions of programs.
+const PROGRAMS: [&str; 14] = ["py", "m", "c", "cc", "cpp", "cxx", "h", "hpp", "js", "ts", "java", "rs", "jl", "ipynb"];
+
 /// Extensions of texts in sentences, where words in brackets are no code.
 const PROSE: [&str; 4] = ["md", "txt", "rst", "tex"];
-
-/// Characters that pages name.
-const ENTITIES: [(&str, &str); 8] = [
-    ("&alpha;", "\u{3b1}"),
-    ("&theta;", "\u{3b8}"),
-    ("&pi;", "\u{3c0}"),
-    ("&minus;", "-"),
-    ("&deg;", "\u{b0}"),
-    ("&nbsp;", " "),
-    ("&lowast;", "*"),
-    ("&amp;", "&"),
-];
 
 /// Every way to read a file.
 pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
@@ -65,7 +57,7 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         return Err(files::Error::format(path, None, message, Some(hint)));
     }
     let Some(text) = text else { return of_grid(&Grid::read(path, WHAT, HINT)?, asked, None) };
-    let text = without_entities(&text);
+    let text = dh_text::indexed(&without_entities(&text)).into_owned();
     let refuse = |(line, message): dh_text::Wrong| empty(path).refuse(line, message, Some(HINT));
     if (is(&PROSE) || text.trim_start().starts_with('\\'))
         && let Some(rows) = latex::table(&text).map_err(refuse)?
@@ -78,27 +70,97 @@ pub fn readings(path: &Utf8Path, asked: &Asked) -> Result<Vec<Reading>> {
         return Err(empty(path).refuse(line, what, Some(ur_calibration::HINT)));
     }
     if let (Some(links), None) = (&read.links, &given) {
-        return Ok(vec![of_links(path, &read, links, asked)?]);
+        let is_example = is(&PROSE) && !links.calls && !links.of_lists;
+        let table = is_example.then(|| longer_table(path, &text, links, asked)).flatten();
+        return table.map_or_else(|| Ok(vec![of_links(path, &read, links, asked)?]), Ok);
     }
     let width = given.as_ref().map_or(4, Vec::len);
-    if let Some(matrix) = dh_text::matrix(&text, &read.known, width).map_err(refuse)? {
-        let grid = Grid { rows: matrix.rows.clone(), ..empty(path) };
-        let names = given.clone().or(matrix.names.map(|names| names.map(str::to_owned).to_vec()));
-        let names = names.as_deref();
-        let mut ways = ways(&Table {
-            names,
-            known: &read.known,
-            ..table(&grid, &matrix.rows, asked, read.words, given.as_deref())
-        })?;
-        ways.iter_mut().for_each(|way| way.said += &beside_others(&matrix));
-        return Ok(ways);
+    let mut matrix = dh_text::matrix(&text, &read.known, width).map_err(refuse)?;
+    if matrix.is_none() && given.is_none() {
+        // Without theta it is a robot's where its columns are named.
+        let of_three = dh_text::matrix(&text, &read.known, 3).ok().flatten();
+        matrix = of_three.filter(|matrix| matrix.names.is_some());
+    }
+    if let Some(matrix) = matrix {
+        return of_matrix(path, &read, &matrix, asked);
     }
     if let Some((line, _)) = read.links.as_ref().and_then(|links| links.rows.first()) {
         let message = "the parameters have names of their own here, and no table has columns to name".to_owned();
         return Err(empty(path).refuse(*line, message, Some("leave out `--columns`")));
     }
-    let of_rows = of_grid(&Grid::of_text(path, alone(path, &text)?.into_owned())?, asked, Some(read.words));
-    of_rows.map_err(|error| read.incomplete.map_or(error, refuse))
+    let of_rows =
+        alone(path, &text).and_then(|text| of_grid(&Grid::of_text(path, text.into_owned())?, asked, Some(read.words)));
+    let none = |error| if is(&PROGRAMS) && given.is_none() { nothing(path, &text, &read.known) } else { error };
+    // Without names a program's numbers may be anything.
+    let of_rows = match of_rows {
+        Ok(ways) if is(&PROGRAMS) && given.is_none() && ways.len() > 1 => {
+            return Err(nothing(path, &text, &read.known));
+        }
+        of_rows => of_rows,
+    };
+    of_rows.map_err(|error| read.incomplete.map_or_else(|| none(error), refuse))
+}
+
+/// What is said of a program in which nothing was found.
+fn nothing(path: &Utf8Path, text: &str, known: &Known) -> files::Error {
+    if let Some(three) = dh_text::matrix(text, known, 3).ok().flatten().filter(|m| m.rows.len() > 3) {
+        let message = "rows of 3 numbers stand here, and what they are is not said".to_owned();
+        let hint = "where theta is not written, `--columns a,alpha,d` in their order names them";
+        return empty(path).refuse(three.rows[0].0, message, Some(hint));
+    }
+    let about = |line: &&str| ["alpha", "\u{3b1}", "dh", "DH", "enavit"].iter().any(|word| line.contains(word));
+    let line = text.lines().position(|line| about(&line)).map_or(1, |at| at as u64 + 1);
+    let message = "no Denavit-Hartenberg parameters were found that stand in this program as numbers: lists called alpha, a, d and theta, rows in \
+                   brackets, parameters by name and calls of a toolbox are read";
+    empty(path).refuse(line, message.to_owned(), Some(HINT))
+}
+
+/// The table of a document where it has more rows than links are made beside it, as an example has them.
+fn longer_table(path: &Utf8Path, text: &str, links: &Links, asked: &Asked) -> Option<Vec<Reading>> {
+    let table = alone(path, text).ok().filter(|table| table.len() < text.len())?;
+    let mut ways = of_grid(&Grid::of_text(path, table.into_owned()).ok()?, asked, Some(Words::of(text, ""))).ok()?;
+    let longer = ways.iter().all(|way| way.rows.len() > links.rows.len());
+    let line = links.rows.first().map_or(1, |(line, _)| *line);
+    for way in &mut ways {
+        way.ends_said.push(format!(
+            "the table of {} joints is taken, and the {} links from line {line} on, which the text makes beside it, are LEFT OUT",
+            way.rows.len(),
+            links.rows.len()
+        ));
+    }
+    longer.then_some(ways)
+}
+
+/// The table in brackets of a program.
+fn of_matrix(path: &Utf8Path, read: &Text, matrix: &dh_text::Matrix, asked: &Asked) -> Result<Vec<Reading>> {
+    let given = given(asked);
+    let grid = Grid { rows: matrix.rows.clone(), ..empty(path) };
+    let names = given.clone().or(matrix.names.as_ref().map(|names| names.iter().map(|n| (*n).to_owned()).collect()));
+    let table = Table {
+        names: names.as_deref(),
+        known: &read.known,
+        joints: Some(&read.joints),
+        ..table(&grid, &matrix.rows, asked, read.words, given.as_deref())
+    };
+    let variables = (0..matrix.rows.len()).any(|at| table.has_variable(at));
+    let mut ways = ways(&table)?;
+    for way in &mut ways {
+        way.said += &beside_others(matrix);
+        fits(path, read, way, variables)?;
+        way.ends_said.extend(read.joints.apart(way.rows.len()));
+    }
+    Ok(ways)
+}
+
+/// Refuses rows of more joints than have limits, and says where readings are fewer.
+fn fits(path: &Utf8Path, read: &Text, way: &mut Reading, variables: bool) -> Result<()> {
+    let (limits, readings) = read.joints.fewer(way.rows.len());
+    if let Some((line, message)) = limits.filter(|_| !variables) {
+        let hint = "take the row that holds still out of the file and write it into the robot file's [base] or [flange], or give each joint its limits";
+        return Err(empty(path).refuse(line, message, Some(hint)));
+    }
+    way.ends_said.extend(readings.filter(|_| !variables));
+    Ok(())
 }
 
 /// Which table of several was taken.
@@ -114,7 +176,7 @@ fn beside_others(matrix: &dh_text::Matrix) -> String {
     }
 }
 
-fn empty(path: &Utf8Path) -> Grid {
+pub(super) fn empty(path: &Utf8Path) -> Grid {
     Grid::empty(path, Form::Delimited(','), None)
 }
 
@@ -131,24 +193,35 @@ fn table<'a>(
     given: Option<&'a [String]>,
 ) -> Table<'a> {
     static NONE: Known = Known::new();
-    Table { grid, rows, names: given, given, known: &NONE, words, units: asked.units }
+    Table { grid, rows, names: given, given, known: &NONE, words, still: &[], joints: None, units: asked.units }
 }
 
 /// The one way to read a table with names, or all of one without.
 fn ways(table: &Table) -> Result<Vec<Reading>> {
-    match table.names {
-        Some(names) => Ok(vec![reading(table, offsets::columns(table, names)?)?]),
-        None => without_names(table),
+    let Some(names) = table.names else { return without_names(table) };
+    let (names, rows) = prepared::without_units(table, names)?;
+    let table = Table { names: Some(&names), rows: &rows, ..*table };
+    if !prepared::lacks_theta(&table, &names)? {
+        return Ok(vec![reading(&table, offsets::columns(&table, &names)?)?]);
     }
+    let (names, rows) = prepared::with_theta(&names, &rows);
+    let mut found = reading(&Table { names: Some(&names), rows: &rows, ..table }, named(table.grid, &names)?)?;
+    found.said += ", no column of theta: 0 beside each joint's variable";
+    Ok(vec![found])
 }
 
 /// Every order that the columns of a table without names may have.
 fn without_names(table: &Table) -> Result<Vec<Reading>> {
     let rows = table.rows;
     // Columns of words and of the joint's number are no parameters.
-    let is_number = |c: usize| rows.iter().all(|(_, r)| table.value(&r[c]).is_some());
-    let free: Vec<usize> =
-        (0..rows[0].1.len()).filter(|&c| is_number(c) && !(table.counts(c) && rows.len() > 2)).collect();
+    let is_number = |c: &usize| rows.iter().all(|(_, r)| table.value(&r[*c]).is_some());
+    // `A3` may be the label of a row, too.
+    let is_axis = |c: &usize| rows.iter().all(|(_, r)| table.theta(&r[*c]).is_some());
+    let counts = |c: &usize| table.counts(*c) && rows.len() > 2;
+    let mut free: Vec<usize> = (0..rows[0].1.len()).filter(|c| is_number(c) && !counts(c)).collect();
+    if free.len() == 3 {
+        free = (0..rows[0].1.len()).filter(|c| is_axis(c) && !counts(c)).collect();
+    }
     let [w, x, y, z] = free[..] else {
         let message = format!("{} columns of numbers without names; four are needed", free.len());
         let width = rows[0].1.len();
@@ -160,19 +233,23 @@ fn without_names(table: &Table) -> Result<Vec<Reading>> {
         };
         return Err(table.grid.refuse(rows[0].0, message, Some(&hint)));
     };
-    let columns = [w, x, y, z];
-    let in_order = |order: &[usize; 4]| {
-        let mut of_row = [0; 4];
-        order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
-        of_row
-    };
+    let (mut readings, wrong) = in_orders(table, [w, x, y, z], &ORDERS);
     // Lengths in the place of angles are no multiples of a quarter turn.
-    let (mut readings, mut wrong) = (Vec::new(), None);
-    for order in &ORDERS {
-        match reading(table, in_order(order)) {
-            Ok(found) => readings.push(found),
-            Err(e) => wrong = wrong.or(Some(e)),
-        }
+    let odd = |r: &Reading| r.rows.iter().any(|row| [row[1], row[3]].iter().any(|v| is_turn(v / r.length_mm)));
+    let theta = [w, x, y, z]
+        .into_iter()
+        .position(|c| rows.iter().any(|(_, row)| table.theta(&row[c]).is_some_and(|v| v.variable)));
+    if let Some(theta) = theta.filter(|_| readings.iter().all(odd)) {
+        // Where variables show theta, the others may have any order.
+        let with_theta = |[p, q, r]: [usize; 3]| {
+            let mut order = vec![p, q, r];
+            order.insert(theta, 2);
+            [order[0], order[1], order[2], order[3]]
+        };
+        let orders = [[0, 1, 3], [0, 3, 1], [1, 0, 3], [1, 3, 0], [3, 0, 1], [3, 1, 0]].map(with_theta);
+        let mut others = in_orders(table, [w, x, y, z], &orders).0;
+        others.retain(|reading| !odd(reading));
+        readings = if others.is_empty() { readings } else { others };
     }
     if let Some(wrong) = wrong.filter(|_| readings.is_empty()) {
         return Err(wrong);
@@ -182,9 +259,24 @@ fn without_names(table: &Table) -> Result<Vec<Reading>> {
     Ok(if likely.is_empty() { readings } else { likely })
 }
 
+/// The readings of these columns in each of the orders, and why the first that is none is refused.
+fn in_orders(table: &Table, columns: [usize; 4], orders: &[[usize; 4]]) -> (Vec<Reading>, Option<files::Error>) {
+    let (mut readings, mut wrong) = (Vec::new(), None);
+    for order in orders {
+        let mut of_row = [0; 4];
+        order.iter().zip(columns).for_each(|(&which, column)| of_row[which] = column);
+        match reading(table, of_row) {
+            Ok(found) => readings.push(found),
+            Err(e) => wrong = wrong.or(Some(e)),
+        }
+    }
+    (readings, wrong)
+}
+
 /// The rows of a file; `words` are of all its text, where that is known.
 fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Reading>> {
     let given = given(asked);
+    let grid = &prepared::rejoined(grid);
     let Headed { names, rows } = match given {
         Some(_) => header::rows_alone(grid, &is_number)?,
         None => header::split(grid, &is_number)?,
@@ -203,7 +295,9 @@ fn of_grid(grid: &Grid, asked: &Asked, words: Option<Words>) -> Result<Vec<Readi
 
 /// Whether a cell is a number or a formula; a name alone, `theta`, is of a column.
 fn is_number(cell: &str) -> bool {
+    let cell = &dh_text::indexed(cell);
     header::is_number(cell)
+        || prepared::of_unit(cell).is_some()
         || cell.contains(|c: char| c.is_ascii_digit() || c == '/')
             && expression::evaluate(cell, &|_| None).or_else(|| expression::counted_back(cell, &|_| None)).is_some()
 }
@@ -233,92 +327,25 @@ fn of_links(path: &Utf8Path, read: &Text, links: &Links, asked: &Asked) -> Resul
     };
     let rows: Vec<(u64, Fields)> = (0..links.rows.len()).map(row).collect();
     let grid = Grid { rows: rows.clone(), ..empty(path) };
-    let table = Table { names: Some(&names), ..table(&grid, &rows, asked, read.words, None) };
+    let table = Table { names: Some(&names), still: &links.still, ..table(&grid, &rows, asked, read.words, None) };
     let mut found = reading(&table, [0, 1, 2, 3])?;
+    let joints = table.turning([0, 1, 2, 3])?;
     found.stated = links.convention;
     found.calls = links.calls;
     // A call says of an offset that it is one.
     found.offsets = found.offsets.filter(|_| !links.calls);
     found.contradiction = links.contradiction.clone();
-    found.flipped = links.flipped.clone();
-    let flipped: Vec<String> = (1..).zip(&links.flipped).filter(|(_, f)| **f).map(|(j, _)| j.to_string()).collect();
+    found.flipped = links.flipped[joints].to_vec();
+    let flipped: Vec<String> = (1..).zip(&found.flipped).filter(|(_, f)| **f).map(|(j, _)| j.to_string()).collect();
     if !flipped.is_empty() {
         found.said += &format!(", counted the other way (flip): {}", flipped.join(", "));
     }
     found.ends = links.ends.map(|end| end.map(|end| end.in_mm(found.length_mm)));
     found.ends_said.clone_from(&links.ends_said);
+    fits(path, read, &mut found, links.rows.iter().any(|(_, row)| row[2].variable))?;
+    found.ends_said.extend(read.joints.apart(found.rows.len()).filter(|_| !links.of_lists));
     if links.limited && found.limits_deg.iter().any(Option::is_none) {
         found.said.push_str(", left out: qlim");
     }
     Ok(found)
-}
-
-/// The text with characters for what pages write for them, `&theta;` and `&#8321;`.
-fn without_entities(text: &str) -> Cow<'_, str> {
-    if !text.contains('&') {
-        return text.into();
-    }
-    let text = ENTITIES.iter().fold(text.to_owned(), |text, (name, c)| text.replace(name, c));
-    let mut pieces = text.split("&#");
-    let mut plain = pieces.next().unwrap_or("").to_owned();
-    for piece in pieces {
-        let decoded = piece.split_once(';').and_then(|(code, rest)| {
-            let number =
-                code.strip_prefix('x').map_or_else(|| code.parse().ok(), |hex| u32::from_str_radix(hex, 16).ok());
-            Some(format!("{}{rest}", char::from_u32(number?)?))
-        });
-        plain.push_str(&decoded.unwrap_or_else(|| format!("&#{piece}")));
-    }
-    plain.into()
-}
-
-/// The table of a document alone, whose rows have bars between their cells, in lines where they stand; the text where
-/// it has none.
-fn alone<'a>(path: &Utf8Path, text: &'a str) -> Result<Cow<'a, str>> {
-    let lines: Vec<&str> = text.lines().collect();
-    let is_rule = |line: &str| !line.trim().is_empty() && line.chars().all(|c| "-=+|: \t".contains(c));
-    let is_row = |line: &str| line.matches('|').count() > 2;
-    let mut blocks: Vec<Vec<usize>> = Vec::new();
-    let mut open = false;
-    for (at, line) in lines.iter().enumerate().filter(|(_, line)| !is_rule(line)) {
-        match (is_row(line), blocks.last_mut().filter(|_| open)) {
-            (true, Some(block)) => block.push(at),
-            (true, None) => blocks.push(vec![at]),
-            (false, _) => {}
-        }
-        open = is_row(line);
-    }
-    // A table that is none of a robot has other names.
-    let is_named = |block: &&Vec<usize>| {
-        let first = lines[block[0]].to_lowercase();
-        (first.contains("alpha") || first.contains('\u{3b1}')) && block.len() > 2
-    };
-    let long = |block: &&Vec<usize>| block.len() > 2;
-    let mut found: Vec<&Vec<usize>> = blocks.iter().filter(is_named).collect();
-    if found.is_empty() {
-        found = blocks.iter().filter(long).collect();
-    }
-    let block = match found[..] {
-        [] => return Ok(text.into()),
-        [block] => block,
-        [one, other, ..] => {
-            let message = format!(
-                "a second table begins here; another is at line {}, and which is the robot's is not said",
-                one[0] + 1
-            );
-            return Err(empty(path).refuse(other[0] as u64 + 1, message, Some("leave one of them in the file")));
-        }
-    };
-    // Names may stand above a table without bars between them.
-    let cells = |line: &str| line.trim().trim_matches('|').matches('|').count() + 1;
-    let above = (0..block[0]).rev().find(|&at| !lines[at].trim().is_empty());
-    let words = above.map(|at| lines[at].split_whitespace().collect::<Vec<_>>()).unwrap_or_default();
-    let mut rows = vec![String::new(); lines.len()];
-    if let Some(at) = above.filter(|_| words.len() == 4 && cells(lines[block[0]]) == 5) {
-        rows[at] = format!("-|{}", words.join("|"));
-    }
-    for &at in block {
-        rows[at] = lines[at].trim().trim_matches('|').to_owned();
-    }
-    Ok((rows.join("\n") + "\n").into())
 }

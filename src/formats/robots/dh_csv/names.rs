@@ -55,11 +55,20 @@ pub(super) fn zero_offsets(names: &[String]) -> Option<usize> {
     found.next().filter(|_| found.next().is_none() && names.iter().any(is_d))
 }
 
-/// The column of a parameter.
-fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
-    let (wanted, own) = (NAMES[which], OWN[which]);
-    if let Some(at) = names.iter().position(|n| n.eq_ignore_ascii_case(own)) {
-        return Ok(at);
+/// The columns of alpha, a and d where each has one, and theta has none.
+pub(super) fn without_theta(names: &[String]) -> Option<[usize; 3]> {
+    let only = |which: usize| match columns(names, which)[..] {
+        [at] => Some(at),
+        _ => None,
+    };
+    let none = columns(names, 2).is_empty() && zero_offsets(names).is_none();
+    Some([only(0)?, only(1)?, only(3)?]).filter(|_| none)
+}
+
+/// The columns that a parameter may have.
+fn columns(names: &[String], which: usize) -> Vec<usize> {
+    if let Some(at) = names.iter().position(|n| n.eq_ignore_ascii_case(OWN[which])) {
+        return vec![at];
     }
     let says = |name: &String| {
         let words = plain(name).0;
@@ -69,7 +78,13 @@ fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
         if letters.is_empty() { matches!(&words[..], [only] if is_it(only)) } else { letters.into_iter().all(is_it) }
     };
     let is_other = |at: usize| which == 3 && zero_offsets(names) == Some(at);
-    let found: Vec<usize> = (0..names.len()).filter(|&i| says(&names[i]) && !is_other(i)).collect();
+    (0..names.len()).filter(|&i| says(&names[i]) && !is_other(i)).collect()
+}
+
+/// The column of a parameter.
+fn find(grid: &Grid, names: &[String], which: usize) -> Result<usize> {
+    let (wanted, own) = (NAMES[which], OWN[which]);
+    let found = columns(names, which);
     let line = grid.rows.first().map_or(1, |(line, _)| *line);
     match found[..] {
         [at] => Ok(at),

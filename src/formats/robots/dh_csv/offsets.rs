@@ -28,7 +28,7 @@ pub(super) fn columns(table: &Table, names: &[String]) -> Result<[usize; 4]> {
     }
     let [of_theta, Some(line)] = moved else { return Ok(columns) };
     // What theta says besides, which rows turn and which way, would be lost.
-    let is_plain = table.turning(columns)? == table.rows.len() && !table.flipped(columns)?.contains(&true);
+    let is_plain = table.turning(columns)? == (0..table.rows.len()) && !table.flipped(columns)?.contains(&true);
     if of_theta.is_some() || !is_plain {
         let [theta, offset] = [columns[2], offset].map(|at| &names[at]);
         let message = format!(

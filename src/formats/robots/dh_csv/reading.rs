@@ -2,6 +2,7 @@
 //! behind it (classic, Denavit and Hartenberg), and what tells it.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use super::beside::{Beside, Limits};
 use super::names::{NAMES, OWN, level, plain};
@@ -30,7 +31,8 @@ const BUILT_DEG: f64 = 5.0;
 pub struct Reading {
     /// In deg and mm.
     pub(super) rows: Vec<Row>,
-    /// Rows behind the last joint.
+    /// Rows before the first joint, and behind the last.
+    pub(super) base: Vec<Row>,
     pub(super) flange: Vec<Row>,
     /// Other columns, of a table with names.
     pub(super) beta_deg: Vec<Option<f64>>,
@@ -41,7 +43,7 @@ pub struct Reading {
     pub(super) flipped: Vec<bool>,
     /// What a toolbox puts before the first joint's frame, its base, and behind the last one's, its tool, mm.
     pub(super) ends: [Option<Transform>; 2],
-    /// What is said of these, each a sentence.
+    /// What is said of these and of what was left out, each a sentence.
     pub ends_said: Vec<String>,
     /// What the table's unit of lengths is in mm.
     pub(super) length_mm: f64,
@@ -76,10 +78,12 @@ impl Reading {
             (joint.slides, joint.limits_rad) = (true, *limits);
         }
         robot.joints.iter_mut().zip(&self.flipped).filter(|(_, f)| **f).for_each(|(joint, _)| joint.sign = -1.0);
+        let held = |rows: &[Row]| from_rows(name, convention, rows).root_from_flange(&vec![0.0; rows.len()]);
         if !self.flange.is_empty() {
-            let held = from_rows(name, convention, &self.flange);
-            let still = vec![0.0; self.flange.len()];
-            robot.ends.last_frame_from_flange *= held.root_from_flange(&still);
+            robot.ends.last_frame_from_flange *= held(&self.flange);
+        }
+        if !self.base.is_empty() {
+            robot.ends.root_from_frame0 = held(&self.base) * robot.ends.root_from_frame0;
         }
         let [base, tool] = self.ends.map(Option::unwrap_or_default);
         robot.ends.root_from_frame0 = base * robot.ends.root_from_frame0;
@@ -158,12 +162,13 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     for row in &mut rows {
         *row = [alpha.converted(row[0]), a.converted(row[1]), theta.converted(row[2]), d.converted(row[3])];
     }
-    let flange = rows.split_off(joints);
-    let Beside { mut beta_deg, mut limits_deg, mut slides, left_out } = table.beside(columns)?;
-    beta_deg.truncate(joints);
-    limits_deg.truncate(joints);
-    slides.truncate(joints);
-    let flipped: Vec<bool> = table.flipped(columns)?.into_iter().take(joints).collect();
+    let Range { start, end } = joints;
+    let flange = rows.split_off(end);
+    let base: Vec<Row> = rows.drain(..start).collect();
+    let Beside { beta_deg, limits_deg, slides, left_out } = table.beside(columns)?;
+    let (beta_deg, slides) = (beta_deg[start..end].to_vec(), slides[start..end].to_vec());
+    let mut limits_deg = limits_deg[start..end].to_vec();
+    let flipped = table.flipped(columns)?[start..end].to_vec();
     let numbers = |of: &[bool]| -> String {
         let which: Vec<String> = (1..).zip(of).filter(|(_, of)| **of).map(|(j, _)| j.to_string()).collect();
         which.join(", ")
@@ -174,7 +179,7 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     }
     let stated = names.and_then(|names| of_link_before(names, columns));
     let own = names.is_some_and(|n| columns.iter().zip(OWN).all(|(&c, own)| n[c].eq_ignore_ascii_case(own)));
-    let offsets = odd_offsets(table, columns[2], &rows, &slides, if own { BUILT_DEG } else { DRAWN_DEG });
+    let offsets = odd_offsets(table, (columns[2], start), &rows, &slides, if own { BUILT_DEG } else { DRAWN_DEG });
     let mut order: Vec<(usize, &str)> = columns.iter().copied().zip(NAMES).collect();
     order.sort_unstable();
     let columns = order.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",");
@@ -183,7 +188,7 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
         false => format!("{} and {}", one.word(), other.word()),
     };
     let (angle, length) = (word(alpha, theta), word(a, d));
-    let mut said = format!("{joints} joints; columns {columns}, angles in {angle}, lengths in {length}");
+    let mut said = format!("{} joints; columns {columns}, angles in {angle}, lengths in {length}", rows.len());
     if slides.contains(&true) {
         let _ = write!(said, ", sliding: {}", numbers(&slides));
     }
@@ -193,23 +198,29 @@ pub(super) fn reading(table: &Table, columns: [usize; 4]) -> Result<Reading> {
     if names.is_none() {
         said.push_str(", no header");
     }
-    if !flange.is_empty() {
-        let _ = write!(said, ", flange behind row {joints}");
-    }
+    said += &if flange.is_empty() { String::new() } else { format!(", flange behind row {end}") };
+    said += &if base.is_empty() { String::new() } else { format!(", base before row {}", start + 1) };
     if !left_out.is_empty() {
         let _ = write!(said, ", left out: {}", left_out.join(", "));
     }
     let (words, open) = (table.words, angles_open.or(lengths_open));
-    let found = Reading { rows, flange, beta_deg, limits_deg, slides, flipped, said, columns, ..Reading::default() };
+    let found =
+        Reading { rows, base, flange, beta_deg, limits_deg, slides, flipped, said, columns, ..Reading::default() };
     Ok(Reading { stated, words, own, open, offsets, length_mm: d.converted(1.0), ..found })
 }
 
 /// The numbers in the place of theta that a drawing seldom has, where nothing says that they are offsets.
-fn odd_offsets(table: &Table, theta: usize, rows: &[Row], slides: &[bool], from_deg: f64) -> Option<String> {
+fn odd_offsets(
+    table: &Table,
+    (theta, first): (usize, usize),
+    rows: &[Row],
+    slides: &[bool],
+    from_deg: f64,
+) -> Option<String> {
     let is_offset = table.names.is_some_and(|names| names[theta].to_lowercase().contains("offset"));
     let is_odd = |(at, row): &(usize, &Row)| {
         let from_drawn_deg = row[2] - 90.0 * (row[2] / 90.0).round();
-        let added = table.value(&table.rows[*at].1[theta]).is_some_and(|v| v.variable);
+        let added = table.theta(&table.rows[first + at].1[theta]).is_some_and(|v| v.variable);
         from_drawn_deg.abs() > from_deg && !(added || slides[*at])
     };
     let odd = rows.iter().enumerate().filter(is_odd);

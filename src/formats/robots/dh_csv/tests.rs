@@ -4,6 +4,7 @@ use crate::files::Result;
 use crate::robot::catalogue::Convention;
 use crate::tables::names::Unit;
 
+mod code;
 mod joints;
 
 fn of(name: &str, text: &str, asked: Asked) -> Result<Vec<Reading>> {

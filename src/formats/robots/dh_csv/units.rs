@@ -81,10 +81,14 @@ fn largest(numbers: &[Row], at: [usize; 2]) -> f64 {
     numbers.iter().flat_map(|row| at.map(|k| row[k].abs())).fold(0.0, f64::max)
 }
 
-/// A length that is a quarter or a half turn in radians to six digits, with its row.
+/// Whether a length is a quarter or a half turn in radians to six digits.
+pub(super) fn is_turn(v: f64) -> bool {
+    v.abs() < 4.0 && from_quarter(v) * std::f64::consts::FRAC_PI_2 < 1e-5
+}
+
+/// A length that is a turn, with its row.
 fn odd_length(numbers: &[Row]) -> Option<(usize, f64)> {
-    let turn = |v: f64| v.abs() < 4.0 && from_quarter(v) * std::f64::consts::FRAC_PI_2 < 1e-5;
-    numbers.iter().enumerate().find_map(|(i, row)| Some((i, [row[1], row[3]].into_iter().find(|v| turn(*v))?)))
+    numbers.iter().enumerate().find_map(|(i, row)| Some((i, [row[1], row[3]].into_iter().find(|v| is_turn(*v))?)))
 }
 
 /// Refuses a unit that names state and numbers rule out.

@@ -75,6 +75,11 @@ impl Scan<'_> {
         } else {
             let first = &inside[..extent(inside)];
             let named = first.trim().is_empty() || first.contains('=') || first.trim_start().starts_with(['\'', '"']);
+            // `Link(i)` names a column.
+            let is_index = matches!(first.trim(), "i" | "j" | "n" | "k" | "i-1" | "i+1");
+            if is_index && self.text[..start].rsplit('\n').next().is_none_or(|line| !line.contains('=')) {
+                return Ok(());
+            }
             if !named {
                 return Err((self.line, format!("`{word}({}, ...)`: parameters without names", first.trim())));
             }

@@ -51,6 +51,14 @@ pub(super) struct Link {
     pub slides: bool,
     /// Whether a word beside its parameters said so or not, `type: prismatic`.
     pub kind: bool,
+    /// Whether such a word says that it holds still, `type: fixed`.
+    pub fixed: bool,
+    /// What stands for d where that is a variable.
+    pub variable_d: Option<String>,
+    /// What it is called.
+    pub name: Option<String>,
+    /// The list around it: its place in the text, and its name.
+    pub of: Option<(usize, String)>,
     /// Whether the joint counts the other way.
     pub flipped: bool,
     /// The convention that its call says.
@@ -66,6 +74,15 @@ impl Link {
     /// What a word beside its parameters says.
     pub fn kind(&mut self, slides: bool) {
         (self.kind, self.slides) = (true, slides);
+    }
+
+    /// What is wrong with a variable for d of a joint that is not said to slide.
+    pub fn unsaid(&self) -> Option<Wrong> {
+        let text = self.variable_d.as_ref().filter(|_| !self.slides)?;
+        let message = format!(
+            "d is `{text}`: a joint that slides, which `type: prismatic` beside its parameters says, or a name that stands for no number"
+        );
+        Some((self.line, message))
     }
 
     /// Alpha, a, theta and d, zero where nothing says otherwise. What a call makes moves, whatever its theta says.

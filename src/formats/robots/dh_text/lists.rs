@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use super::indexed::opening;
 use super::link::{KEYS, Known, Link, Wrong};
 use crate::robot::catalogue::Convention;
 use crate::tables::expression::{Value, evaluate};
@@ -18,7 +19,7 @@ const OTHERS: [&str; 9] = ["delta", "error", "err", "std", "min", "max", "lim", 
 /// none.
 pub(super) fn list(value: &str, known: &Known) -> Option<Vec<Value>> {
     let value = value.trim_start();
-    let open = value.find(['[', '{'])?;
+    let open = opening(value)?;
     let head = value[..open].trim();
     let turned = head.trim_end_matches('(').rsplit('.').next().is_some_and(|f| matches!(f, "deg2rad" | "radians"));
     if !(head.is_empty() || head.ends_with('(') && head.len() < 30) || head.contains(['\n', ',', ';']) {
@@ -87,7 +88,17 @@ pub(super) fn links(plain: &Lists, families: &BTreeMap<String, Lists>) -> Result
 }
 
 /// What lists of two parameters lack of the three that every table has.
-pub(super) fn incomplete(lists: &Lists) -> Option<Wrong> {
+pub(super) fn incomplete(lists: &Lists, families: &BTreeMap<String, Lists>) -> Option<Wrong> {
+    let whole = families.iter().filter(|(_, lists)| [0, 1, 3].iter().all(|&which| lists[which].is_some()));
+    if let [(one, _), (other, lists), ..] = whole.collect::<Vec<_>>()[..] {
+        let line = lists[0].as_ref().map_or(1, |(line, _)| *line);
+        return Some((
+            line,
+            format!(
+                "lists of several robots stand here, `{one}` and `{other}`, and which is meant is not said: leave one of them in the file"
+            ),
+        ));
+    }
     const NAMES: [&str; 4] = ["alpha", "a", "theta", "d"];
     let (here, lack): (Vec<usize>, Vec<usize>) = [0, 1, 3].into_iter().partition(|which| lists[*which].is_some());
     let ([one, other], [lack]) = (&here[..], &lack[..]) else { return None };

@@ -5,7 +5,9 @@
 //! the line, since a row less is another robot.
 
 use super::comments;
+use super::indexed::shown;
 use super::link::{Known, Wrong};
+use super::lists::up_to;
 use crate::tables::Fields;
 use crate::tables::expression::evaluate;
 use crate::tables::names;
@@ -17,7 +19,7 @@ const ABOVE: usize = 8;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     pub rows: Vec<(u64, Fields)>,
-    pub names: Option<[&'static str; 4]>,
+    pub names: Option<Vec<&'static str>>,
     /// Where further tables of several rows begin, lines.
     pub others: Vec<u64>,
 }
@@ -93,7 +95,8 @@ fn of_lines(numbered: &[(u64, &str)], known: &Known, width: usize) -> Result<Opt
         let opened = code.matches(['[', '{', '(']).count();
         depth = (depth + opened).saturating_sub(code.matches([']', '}', ')']).count());
     }
-    let runs = runs(&read);
+    let mut runs = runs(&read);
+    runs.retain(|run| !is_transform(run.clone().filter_map(|at| row_of(&read[at].1)), known));
     let rows = |run: &std::ops::Range<usize>| run.clone().filter(|&at| matches!(read[at].1, Line::Row(_))).count();
     let tables = || runs.iter().filter(|run| rows(run) > 1);
     let Some(longest) = tables().map(|run| run.len()).max() else { return Ok(None) };
@@ -119,8 +122,10 @@ fn of_lines(numbered: &[(u64, &str)], known: &Known, width: usize) -> Result<Opt
     let beside = [run.start.wrapping_sub(1), run.end].into_iter().filter(|&at| alike(at));
     for at in whole(&read, run).chain(beside) {
         let wrong = match &read[at].1 {
-            Line::Broken(cell) => format!("`{cell}` stands for no number"),
-            Line::Other { code, .. } => format!("`{code}` is no row of {width} numbers, but stands among such rows"),
+            Line::Broken(cell) => format!("`{}` stands for no number", shown(cell)),
+            Line::Other { code, .. } => {
+                format!("`{}` is no row of {width} numbers, but stands among such rows", shown(code))
+            }
             _ => continue,
         };
         return Err((number(at), wrong + ", and without this row it is another robot"));
@@ -129,10 +134,36 @@ fn of_lines(numbered: &[(u64, &str)], known: &Known, width: usize) -> Result<Opt
         Line::Row(cells) => Some((number(at), Fields::new(cells))),
         _ => None,
     };
-    let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line));
+    let named = lines[run.start.saturating_sub(ABOVE)..=run.start].iter().rev().find_map(|line| order(line, width));
     let others = tables().filter(|other| *other != run && rows(other) >= OF_A_ROBOT);
     let others = others.map(|other| number(other.start)).collect();
     Ok(Some(Matrix { others, rows: run.clone().filter_map(cells).collect(), names: named }))
+}
+
+/// The cells of a row, none where it is broken.
+fn row_of<'a>(line: &'a Line) -> Option<&'a [&'a str]> {
+    match line {
+        Line::Row(cells) => Some(cells),
+        Line::Broken(_) => Some(&[]),
+        _ => None,
+    }
+}
+
+/// Whether rows are those of a homogeneous transform: the last is 0, 0, 0, 1, and those before it turn.
+fn is_transform<'a>(rows: impl Iterator<Item = &'a [&'a str]>, known: &Known) -> bool {
+    let value =
+        |cell: &&str| evaluate(cell, &|name| known.get(name).copied()).filter(|v| !v.variable).map(|v| v.number);
+    let rows: Vec<Option<Vec<f64>>> = rows.map(|cells| cells.iter().map(value).collect()).collect();
+    let [turning @ .., Some(last)] = &rows[..] else { return false };
+    if turning.len() != 3 || last[..] != [0.0, 0.0, 0.0, 1.0] {
+        return false;
+    }
+    let whole: Option<Vec<&[f64]>> = turning.iter().map(|row| row.as_deref().filter(|row| row.len() == 4)).collect();
+    let dot = |a: &[f64], b: &[f64]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    // With a formula in it that stands for no number it is no table either.
+    whole.is_none_or(|rows| {
+        (0..3).all(|i| (0..3).all(|k| (dot(rows[i], rows[k]) - f64::from(u8::from(i == k))).abs() < 1e-3))
+    })
 }
 
 /// The lines of each table: an empty line ends one that is not inside of brackets.
@@ -142,7 +173,8 @@ fn runs(read: &[(usize, Line)]) -> Vec<std::ops::Range<usize>> {
     for (at, (depth, line)) in read.iter().enumerate() {
         match line {
             Line::Row(_) | Line::Broken(_) => {
-                match runs.last_mut().filter(|_| open) {
+                // Behind the bracket that ends a table another begins.
+                match runs.last_mut().filter(|run| open && *depth >= read[run.end - 1].0) {
                     Some(run) => run.end = at + 1,
                     None => runs.push(at..at + 1),
                 }
@@ -170,23 +202,33 @@ fn of<'a>(line: &'a str, code: &'a str, known: &Known, width: usize) -> Line<'a>
     if code.chars().all(is_rule) {
         return Line::Nothing { empty: line.trim().is_empty() };
     }
+    // `], dtype=float)` ends a table.
+    if code.starts_with([']', '}', ')']) && !code.contains(['[', '{']) {
+        return Line::Nothing { empty: false };
+    }
     // Of two rows in a line the first is none less.
     let ends = || code.match_indices([']', '}']).map(|(at, _)| at + 1);
     if code.starts_with(['[', '{']) && ends().any(|end| next_list(code, end).is_some()) {
         return Line::Other { code, list: true };
     }
-    let bracketed = code.rfind(['[', '{']).map(|at| &code[at + 1..]);
+    // `x[0]` is a cell.
+    let opens = |(at, _): &(usize, &str)| !code[..*at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+    let last = code.rmatch_indices(['[', '{']).find(opens);
+    let bracketed = last.map(|(at, _)| &code[at + 1..]).or_else(|| tuple(code));
     let mut inside = bracketed.unwrap_or(code).trim();
     // A bracket that closes what is not opened here is the table's.
     while let Some(rest) = inside.strip_suffix([']', '}', ')', ',', ';', '.', ' ']) {
-        if inside.ends_with(')') && inside.matches('(').count() >= inside.matches(')').count() {
+        let is_own = |open: char, close: char| {
+            inside.ends_with(close) && inside.matches(open).count() >= inside.matches(close).count()
+        };
+        if is_own('(', ')') || is_own('[', ']') {
             break;
         }
         inside = rest;
     }
     let by_comma = inside.contains(',');
     let cells: Vec<&str> = match by_comma {
-        true => inside.split(',').map(str::trim).collect(),
+        true => by_commas(inside),
         false => inside.split_whitespace().collect(),
     };
     let is_number = |cell: &&str| evaluate(cell, &|name| known.get(name).copied()).is_some();
@@ -202,13 +244,38 @@ fn of<'a>(line: &'a str, code: &'a str, known: &Known, width: usize) -> Line<'a>
             Line::Other { code, list }
         }
         None => Line::Row(cells),
-        Some(cell) if numbers >= most && !is_call && order(line).is_none() => Line::Broken(cell),
+        Some(cell) if numbers >= most && !is_call && order(line, width).is_none() => Line::Broken(cell),
         Some(_) => Line::Other { code, list: false },
     }
 }
 
-/// The four parameters in the order in which a line names them, one behind the other.
-fn order(line: &str) -> Option<[&'static str; 4]> {
+/// The inside of a row in parentheses, `(0, 0.3, 0),`.
+fn tuple(code: &str) -> Option<&str> {
+    let inside = code.strip_prefix('(')?;
+    let end = up_to(inside, &[]);
+    let rest = inside.get(end + 1..)?.trim_matches([',', ';', ' ', ')', ']']);
+    (rest.is_empty() && inside[..end].contains(',')).then_some(&inside[..end])
+}
+
+/// Cells with commas between them, those in parentheses aside.
+fn by_commas(mut inside: &str) -> Vec<&str> {
+    let mut cells = Vec::new();
+    loop {
+        let end = up_to(inside, &[',']);
+        cells.push(inside[..end].trim());
+        match inside[end..].strip_prefix(',') {
+            Some(rest) => inside = rest,
+            None => {
+                // Behind a bracket that nothing opened something else goes on.
+                cells.extend(inside[end..].split(',').map(str::trim).filter(|cell| !cell.is_empty()));
+                return cells;
+            }
+        }
+    }
+}
+
+/// The parameters in the order in which a line names them, one behind the other: four, or three without theta.
+fn order(line: &str, width: usize) -> Option<Vec<&'static str>> {
     const INDICES: [&str; 9] = ["i", "j", "n", "rad", "deg", "m", "mm", "offset", "link"];
     let name = |word: &String| match word.as_str() {
         "alpha" | "α" => Some("alpha"),
@@ -220,7 +287,10 @@ fn order(line: &str) -> Option<[&'static str; 4]> {
     let (words, _) = names::words(line);
     let says = |w: &&String| !INDICES.contains(&w.as_str()) && w.parse::<f64>().is_err();
     let found: Vec<Option<&'static str>> = words.iter().filter(says).map(name).collect();
-    let all = |window: &&[Option<&'static str>]| ["alpha", "a", "theta", "d"].iter().all(|n| window.contains(&Some(n)));
-    let window = found.windows(4).find(all)?;
-    Some([window[0]?, window[1]?, window[2]?, window[3]?])
+    let wanted: &[&'static str] = if width == 3 { &["alpha", "a", "d"] } else { &["alpha", "a", "theta", "d"] };
+    let all = |window: &&[Option<&'static str>]| wanted.iter().all(|n| window.contains(&Some(n)));
+    if wanted.len() == 3 && found.contains(&Some("theta")) {
+        return None;
+    }
+    found.windows(wanted.len()).find(all)?.iter().copied().collect()
 }

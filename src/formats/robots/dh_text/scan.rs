@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 
 use super::link::{CALLS, KEYS, Known, Link, Wrong};
 use super::lists::{self, Lists, Numbered, extent, list};
+use super::{indexed, named};
 use crate::formats::robots::dh_words::slides;
-use crate::tables::expression::{Value, evaluate};
+use crate::tables::expression::{self, Value, evaluate};
 
 #[derive(Default)]
 pub(super) struct Scan<'a> {
@@ -32,10 +33,14 @@ impl Scan<'_> {
         let mut before = '\n';
         while let Some(c) = self.text[self.at..].chars().next() {
             let starts = (c.is_alphabetic() || c == '_') && !(before.is_alphanumeric() || matches!(before, '_' | '.'));
-            if starts {
+            if starts || before == '.' && (c.is_alphabetic() || c == '_') {
                 let rest = &self.text[self.at..];
                 let end = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
-                self.word(end)?;
+                if starts {
+                    self.word(end)?
+                } else {
+                    self.field(end)
+                }
                 before = 'a';
                 continue;
             }
@@ -68,6 +73,27 @@ impl Scan<'_> {
 
     pub(super) fn evaluate(&self, text: &str) -> Option<Value> {
         evaluate(text, &|name| self.known.get(name).copied())
+    }
+
+    /// A name of so many bytes behind a dot: a parameter's list of a structure, `DH.alpha(1:7) = [...]`.
+    fn field(&mut self, end: usize) {
+        let (before, word) = (&self.text[..self.at], &self.text[self.at..self.at + end]);
+        self.at += end;
+        let Some(which) = KEYS.iter().position(|names| names.contains(&word)) else { return };
+        let behind = self.text[self.at..].trim_start_matches([' ', '\t']);
+        let range = behind.strip_prefix('(').and_then(|behind| behind.split_once(')'));
+        let last = range.and_then(|(range, _)| range.trim().strip_prefix("1:")?.trim().parse::<usize>().ok());
+        let value = match (range, last) {
+            (Some((_, behind)), Some(_)) => behind.trim_start_matches([' ', '\t']),
+            (Some(_), None) => return,
+            (None, _) => behind,
+        };
+        let Some(value) = value.strip_prefix('=').filter(|value| !value.starts_with('=')) else { return };
+        let equal = || Some(vec![self.evaluate(&value[..extent(value)]).filter(|v| !v.variable)?; last?]);
+        let of = before.trim_end_matches('.').rsplit(|c: char| !(c.is_alphanumeric() || c == '_')).next().unwrap_or("");
+        if let Some(list) = list(value, &self.known).or_else(equal) {
+            self.families.entry(of.to_owned()).or_default()[which].get_or_insert((self.line, list));
+        }
     }
 
     /// A name of so many bytes: a call, a parameter with its value, or a number that gets a name.
@@ -105,18 +131,8 @@ impl Scan<'_> {
                 self.lists[which].get_or_insert((self.line, list));
                 return Ok(());
             }
-            let text = &value[..extent(value)];
-            match self.evaluate(text) {
-                Some(v) if !v.variable || which == 2 => {
-                    self.put(which, v);
-                    self.at = value_at + text.len();
-                }
-                Some(_) if self.depth > 0 => {
-                    return Err((self.line, format!("`{}`: a joint that slides", text.trim())));
-                }
-                None if self.depth > 0 && !text.trim().is_empty() => self.no_number(word, text.trim()),
-                _ => {}
-            }
+            let in_list = quote.is_some() && separator == ',';
+            self.parameter(which, word, (value, value_at), in_list)?;
         } else if let Some((which, number)) = lists::numbered(word)
             && let Some(v) = self.evaluate(&value[..extent(value)]).filter(|v| !v.variable || which == 2)
         {
@@ -129,17 +145,51 @@ impl Scan<'_> {
         Ok(())
     }
 
+    /// A parameter with its value, which stands there; `in_list` says that the name may be a word of a list.
+    fn parameter(&mut self, which: usize, word: &str, (value, at): (&str, usize), in_list: bool) -> Result<(), Wrong> {
+        let text = &value[..extent(value)];
+        let is_length = which == 3 && self.depth > 0 && self.called().is_none();
+        let found = self.evaluate(text);
+        let found = found.or_else(|| self.evaluate(&expression::of_reading(text, 'd')).filter(|_| is_length));
+        match found {
+            Some(v) if v.variable && is_length => {
+                self.put(which, v);
+                let link = self.links.last_mut().map(|link| &mut link.variable_d);
+                link.into_iter().for_each(|d| *d = Some(text.trim().to_owned()));
+                self.at = at + text.len();
+            }
+            Some(v) if !v.variable || which == 2 => {
+                self.put(which, v);
+                self.at = at + text.len();
+            }
+            Some(_) if self.depth > 0 => {
+                return Err((self.line, format!("`{}`: a joint that slides", text.trim())));
+            }
+            None if in_list && text.trim().starts_with(['"', '\'']) => {}
+            None if self.depth > 0 && !text.trim().is_empty() => self.no_number(word, text.trim()),
+            _ => {}
+        }
+        Ok(())
+    }
+
     /// Keeps the first value that is no number.
     fn no_number(&mut self, word: &str, text: &str) {
+        let text = indexed::shown(text);
         let wrong = format!(
-            "`{word}` is `{text}`, which is no number: names that the file sets to numbers above, + - * /, sin, cos, tan and sqrt are followed"
+            "`{word}` is `{text}`, which is no number: names that the file sets to numbers above, + - * /, sin, cos, tan, atan2 and sqrt are followed"
         );
         self.wrong.get_or_insert((self.line, wrong));
     }
 
     /// A word beside a link's parameters that says whether it slides; whether it is one.
     fn of_kind(&mut self, word: &str, value: &str) -> bool {
-        let said = slides(&value[..extent(value)]).filter(|_| matches!(word, "type" | "joint_type"));
+        let text = &value[..extent(value)];
+        let is_kind = matches!(word, "type" | "joint_type");
+        if is_kind && text.trim().trim_matches(['"', '\'']).eq_ignore_ascii_case("fixed") {
+            self.open(|link| !link.kind && !link.fixed).fixed = true;
+            return true;
+        }
+        let said = slides(text).filter(|_| is_kind);
         said.inspect(|slides| self.open(|link| !link.kind).kind(*slides)).is_some()
     }
 
@@ -161,11 +211,18 @@ impl Scan<'_> {
     /// Numbers that get names, `a1, a2 = 0.4, 0.3` too.
     fn assign(&mut self, start: usize, last: String, value: &str) {
         let before = self.text[..start].rsplit(['\n', ';']).next().unwrap_or("");
+        // A type stands before one name: `double a1 = 0.4, a2 = 0.3`.
+        let several = before.contains(',') && !before.contains('=');
         let mut names: Vec<String> = before.split(',').map(|n| n.trim().to_owned()).filter(|n| !n.is_empty()).collect();
+        names.truncate(if several { names.len() } else { 0 });
         names.push(last);
         let mut rest = value;
         for name in names {
             let text = &rest[..extent(rest)];
+            if let Some(list) = list(rest, &self.known) {
+                let elements = list.into_iter().enumerate().map(|(at, v)| (indexed::element(&name, at), v));
+                self.known.extend(elements.filter(|(_, v)| !v.variable));
+            }
             if let Some(v) = self.evaluate(text).filter(|v| !v.variable) {
                 self.known.insert(name, v);
             }
@@ -181,7 +238,8 @@ impl Scan<'_> {
     fn open(&mut self, room: impl Fn(&Link) -> bool) -> &mut Link {
         let is_open = self.links.last().is_some_and(|link| link.depth == self.depth && room(link));
         if !is_open {
-            self.links.push(Link::at(self.line, self.depth));
+            let (name, of) = named::of(self.text, self.at, self.depth);
+            self.links.push(Link { name, of, ..Link::at(self.line, self.depth) });
         }
         let last = self.links.len() - 1;
         &mut self.links[last]
@@ -189,7 +247,7 @@ impl Scan<'_> {
 }
 
 /// What is behind the size of an array that a list follows, `[6] = {0, 1}`.
-fn sized(behind: &str) -> Option<&str> {
+pub(super) fn sized(behind: &str) -> Option<&str> {
     let (size, rest) = behind.strip_prefix('[')?.split_once(']')?;
     let rest = rest.trim_start();
     let listed = rest.strip_prefix('=')?.trim_start().starts_with(['{', '[']);

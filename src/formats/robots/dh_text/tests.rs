@@ -65,11 +65,11 @@ fn a_table_in_brackets_has_its_order_in_a_comment() {
     let body = "dh = np.array([\n    [0, -90, 10, 0],  # joint 1\n    [50, 0, 0, -90],\n    [0, -90, 5, 0]])\n";
     let found = table(&format!("# four parameters a row: [a, alpha, d, theta]\n{body}")).unwrap().unwrap();
     assert_eq!((found.rows.len(), found.rows[1].0), (3, 4));
-    assert_eq!(found.names, Some(["a", "alpha", "d", "theta"]));
+    assert_eq!(found.names, Some(vec!["a", "alpha", "d", "theta"]));
     assert_eq!(table(body).unwrap().unwrap().names, None);
     let matlab = "%   a(i-1)  alpha(i-1)  d(i)  theta_offset\nDH = [0, 0, 77, 0;      % 1\n      0, -pi/2, 0, -pi/2; % 2\n      128, 0, 0, pi/2];\n";
     let found = table(matlab).unwrap().unwrap();
-    assert_eq!((found.names, &found.rows[2].1[3]), (Some(["a", "alpha", "d", "theta"]), "pi/2"));
+    assert_eq!((found.names, &found.rows[2].1[3]), (Some(vec!["a", "alpha", "d", "theta"]), "pi/2"));
     for text in ["x = [1, 2, 3, 4]\n", ""] {
         assert_eq!(table(text), Ok(None), "{text}");
     }

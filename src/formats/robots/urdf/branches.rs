@@ -51,17 +51,41 @@ impl Urdf {
             _ => {
                 let list: Vec<String> = ends.iter().map(|e| format!("{e} ({} joints)", self.moving(e).len())).collect();
                 let message = format!("several links end a chain: {}", list.join(", "));
-                let usable = ends.iter().filter(|e| self.chain(Some(e)).is_ok());
-                // A finger is not where an arm ends.
-                let of_arm = |e: &&String| !grips(e) && !self.moving(e).into_iter().any(grips);
-                let best =
-                    usable.max_by_key(|e| (of_arm(e), self.moving(e).len(), FLANGES.iter().any(|f| e.ends_with(f))));
-                let example =
-                    best.map_or(String::new(), |e| format!("; `--tip {e}` has the most joints that move on their own"));
+                let example = self.best(&ends).map_or(String::new(), |e| {
+                    let joints = count(self.moving(&e).len(), "joint");
+                    format!("; `--tip {e}` has the most that move on their own, {joints}")
+                });
                 let hint = format!("`--tip LINK` names the one that carries the target{example}");
                 Err(self.refuse(None, message, Some(hint)))
             }
         }
+    }
+
+    /// The link whose chain has the most joints that move on their own: of several the flange by its name. A finger is
+    /// not where an arm ends, the link before it is.
+    fn best(&self, ends: &[String]) -> Option<String> {
+        let before_fingers = |end: &String| {
+            let mut link = end.as_str();
+            while let Some(joint) = self.joints.iter().find(|j| j.child == link) {
+                if joint.kind != Kind::Fixed && !self.is_of_finger(&joint.name) && !grips(&joint.child) {
+                    break;
+                }
+                if joint.kind == Kind::Fixed && !grips(link) {
+                    break;
+                }
+                link = &joint.parent;
+            }
+            link.to_owned()
+        };
+        let usable = |link: &String| self.chain_to(link.clone()).is_ok();
+        let candidates = ends.iter().filter(|e| !grips(e)).cloned().chain(ends.iter().map(before_fingers));
+        let rolls = |link: &String| link.to_lowercase().contains("wheel");
+        let rank = |link: &String| {
+            (self.moving(link).len(), !rolls(link), FLANGES.iter().any(|flange| link.ends_with(flange)))
+        };
+        // A hand alone has nothing but fingers.
+        let best = candidates.filter(usable).max_by_key(rank);
+        best.or_else(|| ends.iter().filter(|end| usable(end)).max_by_key(|end| rank(end)).cloned())
     }
 
     /// Whether a joint moves a finger, by its name or by that of what it moves, which may be a whole gripper.
@@ -159,6 +183,63 @@ mod tests {
         // A branch with a joint of its own that is no finger.
         let (said, tip) = of(&[&arm, &frame, &[("balance", "shoulder", "spring")]]);
         assert!(tip == "tool_frame" && said.len() == 1 && said[0].contains("`balance` is left out"), "{tip} {said:?}");
+    }
+
+    #[test]
+    fn the_hint_offers_the_end_with_the_most_joints_and_no_finger() {
+        let said = |joints: &[(&str, &str, &str)]| crate::diagnostic::report(&urdf(joints).flange().unwrap_err());
+        let arm = |n: usize| -> Vec<(String, String, String)> {
+            let link = |k: usize| if k == 0 { "base".to_owned() } else { format!("link{k}") };
+            (0..n).map(|k| (format!("j{k}"), link(k), link(k + 1))).collect()
+        };
+        for n in [1, 3, 6] {
+            let (arm, hand) = (arm(n), format!("link{n}"));
+            let mut joints: Vec<(&str, &str, &str)> = arm.iter().map(|(a, b, c)| (&**a, &**b, &**c)).collect();
+            joints.extend([("finger_1", &*hand, "left_finger"), ("finger_2", &*hand, "right_finger")]);
+            joints.extend([("wheel_1", "base", "wheel_1"), ("wheel_2", "base", "wheel_2")]);
+            let joint = if n == 1 { "joint" } else { "joints" };
+            let said = said(&joints);
+            assert!(
+                said.contains(&format!("`--tip {hand}` has the most that move on their own, {n} {joint}")),
+                "{said}"
+            );
+        }
+        // A hand alone.
+        let hand = said(&[
+            ("thumb", "base", "thumb_tip"),
+            ("a", "base", "finger_1"),
+            ("b", "finger_1", "finger_2"),
+            ("c", "base", "finger_3"),
+            ("d", "finger_3", "finger_4"),
+        ]);
+        assert!(hand.contains("the most that move on their own, 2 joints"), "{hand}");
+    }
+
+    #[test]
+    fn origins_in_mm_or_degrees_are_refused_with_their_joint() {
+        let of = |origin: &str, tip: Option<&str>| {
+            let text = format!(
+                "<robot name=\"r\"><link name=\"b\"/><link name=\"l1\"/><link name=\"l2\"/><link name=\"l3\"/>\n\
+                 <joint name=\"j1\" type=\"revolute\"><parent link=\"b\"/><child link=\"l1\"/><origin xyz=\"0 0 0.3\"/></joint>\n\
+                 <joint name=\"j2\" type=\"revolute\"><parent link=\"l1\"/><child link=\"l2\"/><origin {origin}/></joint>\n\
+                 <joint name=\"j3\" type=\"revolute\"><parent link=\"l1\"/><child link=\"l3\"/></joint>\n</robot>"
+            );
+            Urdf::parse(text, Utf8Path::new("r.urdf")).unwrap().chain(tip).map(|chain| chain.joints.len())
+        };
+        for fine in ["xyz=\"0 -9.9 0.4\"", "xyz=\"0 0 0\" rpy=\"0 12.5 -6.3\"", "rpy=\"1.57 0 0\""] {
+            assert_eq!(of(fine, Some("l2")).unwrap(), 2, "{fine}");
+        }
+        for (wrong, words) in [
+            ("xyz=\"0 0 400\"", "`j2` has 400, which is no m of a robot: these are mm"),
+            ("xyz=\"0 -10.5 0\"", "has 10.5, which is no m"),
+            ("xyz=\"0 0 0.4\" rpy=\"90 0 45\"", "`j2` has 90, which is no rad of a robot: these are degrees"),
+            ("rpy=\"0 0 -13\"", "has 13, which is no rad"),
+        ] {
+            let said = crate::diagnostic::report(&of(wrong, Some("l2")).unwrap_err());
+            assert!(said.contains(words) && said.contains("r.urdf:3") && said.contains("m and rad"), "{said}");
+            // The other branch has none of it.
+            assert_eq!(of(wrong, Some("l3")).unwrap(), 2, "{wrong}");
+        }
     }
 
     #[test]
