@@ -62,7 +62,7 @@ fn read_one(file: &LensFile) -> Result<KnownLenses> {
     }
     let text = files::read_text(path, "file of a lens", Some("`--intrinsics FILE,left` or `--intrinsics FILE,right`"))?;
     let asked = |of: Side| side.is_none_or(|side| side == of);
-    let in_file = export::read_cameras(&text).transpose().map_err(|message| refused(message, HINT))?;
+    let in_file = export::read_cameras(&text).transpose().map_err(|message| refused(message, NAMES))?;
     match in_file {
         Some(Cameras::One(camera)) if side.is_some() => {
             return Ok(KnownLenses::of_cameras(Side::BOTH.map(|of| asked(of).then_some(camera))));

@@ -113,9 +113,9 @@ fn of_calibrator(text: &str) -> Result<Cameras, String> {
     let cameras = project["Calibration"]["cameras"].as_array().map_or(&[][..], Vec::as_slice);
     let one = |camera: &Value| {
         let model = &camera["model"];
-        let name = model["polymorphic_name"].as_str().unwrap_or("without a name");
-        if name != "libCalib::CameraModelOpenCV" {
-            return Err(format!("a camera's model is {name}; libCalib::CameraModelOpenCV is read"));
+        // The first camera of a model names it for all.
+        if let Some(other) = model["polymorphic_name"].as_str().filter(|name| *name != "libCalib::CameraModelOpenCV") {
+            return Err(format!("a camera's model is {other}; libCalib::CameraModelOpenCV is read"));
         }
         let data = &model["ptr_wrapper"]["data"];
         let size = &data["CameraModelCRT"]["CameraModelBase"]["imageSize"];
@@ -270,12 +270,14 @@ mod tests {
             )
         };
         let project = |cameras: &[String]| format!("{{\"Calibration\": {{\"cameras\": [{}]}}}}", cameras.join(", "));
-        let two = read(&project(&[of(0.3, 1.0), of(0.0, 1.0)]));
+        let unnamed = of(0.0, 1.0).replace("\"polymorphic_name\": \"libCalib::CameraModelOpenCV\", ", "");
+        let two = read(&project(&[of(0.3, 1.0), unnamed]));
         let Some(Ok(Cameras::Two([left, right]))) = two else { panic!("{two:?}") };
         assert_eq!((left.fy, left.lens, left.distortion[4]), (800.0, Lens::Brown5, 0.3));
         assert_eq!((right.lens, right.height), (Lens::Brown4, 480));
         assert!(matches!(read(&project(&[of(0.3, 1.2)])), Some(Err(why)) if why.contains("not square")));
-        assert!(matches!(read(&project(&[])), Some(Err(why)) if why.contains("0 cameras")));
+        let other = of(0.3, 1.0).replace("ModelOpenCV", "ModelFisheye");
+        assert!(matches!(read(&project(&[other])), Some(Err(why)) if why.contains("CameraModelFisheye")));
     }
 
     #[test]
