@@ -17,7 +17,7 @@ use crate::statistics::median;
 pub const TYPED_MM: f64 = 10.0;
 
 /// Poses that are enough.
-pub const POSES: usize = 60;
+const POSES: usize = 60;
 
 /// Fewest poses that have more numbers than unknowns.
 const FEWEST: usize = 4;

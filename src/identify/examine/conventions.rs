@@ -76,7 +76,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
             let several = counting::likeliest(&set, &robot);
             let several = self::explaining(&several, &set, &robot, settings, &now, Look::All);
             if makes_plausible(&several) {
-                tried = several;
+                tried = counting::without_untold(&several);
             }
         }
         let best = Likeliest::of(&tried).filter(|best| cut.is_none_or(|cut| best.there.fitted < cut));

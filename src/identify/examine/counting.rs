@@ -10,17 +10,16 @@ use rayon::prelude::*;
 
 use super::hypothesis::{Counting, Hypothesis, still};
 use super::in_hand::most_points;
-use super::misfit::EXPLAINS;
-use crate::difference::TOLD_APART;
+use super::misfit::{EXPLAINS, Misfit};
 use crate::identify::data::dataset::Dataset;
 use crate::robot::Robot;
-use crate::robot::tool_fit::{POSES, Start};
+use crate::robot::tool_fit::Start;
 
 /// Fewest poses: nine unknowns and as many joints as arms have are held against 36 numbers.
 const FEWEST: usize = 12;
 /// Joints of which all choices of signs are tried.
 const MOST_JOINTS: usize = 8;
-/// Choices that are fitted with all links: those that the file's robot does not tell apart.
+/// Choices that are fitted with all links, and as many that say less: those that the file's robot does not tell apart.
 const FITTED: usize = 6;
 /// By what factor the file's robot must come nearer: among the thousand choices that there are, points of another arm
 /// find one that is nearer by some times.
@@ -54,14 +53,22 @@ pub fn likeliest(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
         all.par_iter().filter(|counting| counting.is_of_several()).filter_map(|of| Some((left(*of)?, *of))).collect();
     tried.sort_by(|a, b| a.0.total_cmp(&b.0));
     let Some(least) = tried.first().map(|(mm, _)| *mm).filter(|mm| NEARER * mm < now) else { return Vec::new() };
-    let near: Vec<(f64, Counting)> = tried.into_iter().take_while(|(mm, _)| *mm < EXPLAINS * least).collect();
-    // A change of which the points do not tell is none, by the likelihood of what the file's robot leaves: a row counts
-    // once.
-    let is_told = |(mm, own): &&(f64, Counting)| {
-        near.iter().filter(|(_, other)| other.is_part_of(own)).all(|(of_part, _)| {
-            let rows = points.len().min(POSES) as f64;
-            rows * (of_part / mm).ln() > TOLD_APART
-        })
+    let near = tried.into_iter().take_while(|(mm, _)| *mm < EXPLAINS * least).map(|(_, counting)| counting);
+    let near: Vec<Counting> = near.collect();
+    let (nearest, others) = near.split_at(near.len().min(FITTED));
+    // With fewer changes another placement may tell as much.
+    let parts = others.iter().filter(|other| nearest.iter().any(|own| other.is_part_of(own)));
+    nearest.iter().chain(parts.take(FITTED)).map(|counting| Hypothesis::Counted(*counting)).collect()
+}
+
+/// Those that do not say more than others of them with which fits leave as much.
+pub fn without_untold(tried: &[(Misfit, Hypothesis)]) -> Vec<(Misfit, Hypothesis)> {
+    let says_less = |other: &Hypothesis, own: &Hypothesis| match (other, own) {
+        (Hypothesis::Counted(other), Hypothesis::Counted(own)) => other.is_part_of(own),
+        _ => false,
     };
-    near.iter().filter(is_told).take(FITTED).map(|(_, counting)| Hypothesis::Counted(*counting)).collect()
+    let is_told = |(there, own): &&(Misfit, Hypothesis)| {
+        !tried.iter().any(|(other, hypothesis)| says_less(hypothesis, own) && other.fits_like(there))
+    };
+    tried.iter().filter(is_told).copied().collect()
 }

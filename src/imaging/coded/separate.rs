@@ -287,7 +287,10 @@ fn judged(picture: &Picture, board: &Board, tags: &[Tag], (level, copy): (Level,
     let is_whole = columns * rows == 1 && tags.len() == 1 && tags[0].number == 0;
     if !is_whole && !order.is_sure(tags.len().max(2)) {
         let others = (1..=MOST_COLUMNS).filter(|other| *other != columns).map(of);
-        return of_another_family(picture, board).map_or_else(|| unlike(board, tags, others), Seen::Other);
+        return match unlike(board, tags, others) {
+            Seen::Other(refusal) => Seen::Other(of_another_family(picture, board).unwrap_or(refusal)),
+            seen => seen,
+        };
     }
     let kept: Vec<usize> = if is_whole { vec![0] } else { order.confirmed.clone() };
     let mut by_number: BTreeMap<usize, usize> = BTreeMap::new();
