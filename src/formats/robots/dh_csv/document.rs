@@ -7,8 +7,8 @@ use std::borrow::Cow;
 
 use camino::Utf8Path;
 
-use super::front::empty;
 use crate::files::Result;
+use crate::tables::{Form, Grid};
 
 /// Characters that pages name.
 const ENTITIES: [(&str, &str); 8] = [
@@ -75,7 +75,8 @@ pub(super) fn alone<'a>(path: &Utf8Path, text: &'a str) -> Result<Cow<'a, str>> 
                 "a second table begins here; another is at line {}, and which is the robot's is not said",
                 one[0] + 1
             );
-            return Err(empty(path).refuse(other[0] as u64 + 1, message, Some("leave one of them in the file")));
+            let grid = Grid::empty(path, Form::Delimited(','), None);
+            return Err(grid.refuse(other[0] as u64 + 1, message, Some("leave one of them in the file")));
         }
     };
     // Names may stand above a table without bars between them.

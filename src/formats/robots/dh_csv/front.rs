@@ -176,7 +176,7 @@ fn beside_others(matrix: &dh_text::Matrix) -> String {
     }
 }
 
-pub(super) fn empty(path: &Utf8Path) -> Grid {
+fn empty(path: &Utf8Path) -> Grid {
     Grid::empty(path, Form::Delimited(','), None)
 }
 

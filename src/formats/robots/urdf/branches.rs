@@ -81,7 +81,8 @@ impl Urdf {
         let candidates = ends.iter().filter(|e| !grips(e)).cloned().chain(ends.iter().map(before_fingers));
         let rolls = |link: &String| link.to_lowercase().contains("wheel");
         let rank = |link: &String| {
-            (self.moving(link).len(), !rolls(link), FLANGES.iter().any(|flange| link.ends_with(flange)))
+            let is_named = FLANGES.iter().any(|flange| link.ends_with(flange));
+            (self.moving(link).len(), !rolls(link), ends.contains(link), is_named)
         };
         // A hand alone has nothing but fingers.
         let best = candidates.filter(usable).max_by_key(rank);
