@@ -8,8 +8,9 @@
 //! readings, and which fits as well, is taken. A joint that moves the target little (the last one, with a target near
 //! its axis) shows in neither: there the likelihood of what the fits leave decides. Nothing is mended that none proves,
 //! nothing that sessions along the rows explain better, and nothing that two robots explain about as well. What goes
-//! wrong: two faults at once are found one after the other only where each alone brings an improvement, but for signs of
-//! joints ([`counting`]). What the target's unknown place undoes (the sign of the last joint with a target on its axis) is not seen and costs nothing.
+//! wrong: two faults at once are found one after the other only where each alone brings an improvement, but for signs
+//! of joints (`counting`). What the target's unknown place undoes (the sign of the last joint with a target on its
+//! axis) is not seen and costs nothing.
 
 use std::iter;
 
