@@ -62,8 +62,8 @@ pub struct CameraCheck {
     pub corners: Option<Utf8PathBuf>,
     /// The check board by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100 (columns, rows, square and marker
     /// in mm, dictionary), apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of tags, family, tag and gap in mm), or
-    /// aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike); or a file: Kalibr's target.yaml, a project of calib.io's Calibrator (.json),
-    /// calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
+    /// aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike); or a file: Kalibr's target.yaml, a project of
+    /// calib.io's Calibrator (.json), calib.io_charuco_200x150_8x11_15_11_DICT_5X5.pdf (by its name)
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares", "square_mm"])]
     pub board: Option<Board>,
     /// Squares of the check board, not inner corners, or `auto`: counted where pictures show all of a checkerboard; key
@@ -201,7 +201,8 @@ pub struct Rectify {
     pub zero_disparity: bool,
     /// The board by which the rows are compared, by its name: checker:20x20:10, charuco:11x8:15:11:DICT_5X5_100
     /// (columns, rows, square and marker in mm, dictionary), apriltag:6x6:tag36h11:35.2:10.56 (columns and rows of
-    /// tags, family, tag and gap in mm), or aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike) [default: the board that calibrated, else those of the keys `check_board` and
+    /// tags, family, tag and gap in mm), or aruco:6x4:DICT_6X6_250:30:7.5 (a grid of ArUco markers alike) [default: the
+    /// board that calibrated, else those of the keys `check_board` and
     /// `target_board`]
     #[arg(long, value_name = "BOARD", value_parser = named, conflicts_with_all = ["squares"])]
     pub board: Option<Board>,

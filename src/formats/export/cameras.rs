@@ -1,10 +1,11 @@
 //! The lenses in a file of one camera or of two, by the names that programs and people give them.
 //!
 //! In: the text of a file of OpenCV's FileStorage (YAML, JSON, or XML as [`as_yaml`] has it), of a ROS message, of
-//! camodocal (a pinhole), of calib.io's Calibrator (a project), or as people write it. Out: its cameras; how they stand to each other is not asked. A file that says no size (OpenCV's
-//! stereo sample writes none) gives cameras of none, width and height zero: theirs is that of the pictures. Lenses of
-//! another model than OpenCV's (fisheye, omnidirectional) are refused by what the file calls them, and by a matrix
-//! with a skew. Goes wrong: a file of another model that says so nowhere.
+//! camodocal (a pinhole), of calib.io's Calibrator (a project), or as people write it. Out: its cameras; how they stand
+//! to each other is not asked. A file that says no size (OpenCV's stereo sample writes none) gives cameras of none,
+//! width and height zero: theirs is that of the pictures. Lenses of another model than OpenCV's (fisheye,
+//! omnidirectional) are refused by what the file calls them, and by a matrix with a skew. Goes wrong: a file of another
+//! model that says so nowhere.
 
 use std::borrow::Cow;
 use std::fmt::Write;

@@ -41,8 +41,8 @@ pub fn read(path: &Utf8Path, text: &str) -> Option<Result<Rig, String>> {
     text.contains("!!opencv-matrix").then(|| file_storage::read(text))
 }
 
-/// Reads the lenses of a file: of one camera (ROS, mrcal, OpenCV's sample, a Kalibr chain of one), or of two by the names
-/// of OpenCV's stereo sample. `None` where the text is none of them.
+/// Reads the lenses of a file: of one camera (ROS, mrcal, OpenCV's sample, a Kalibr chain of one), or of two by the
+/// names of OpenCV's stereo sample. `None` where the text is none of them.
 pub fn read_cameras(text: &str) -> Option<Result<Cameras, String>> {
     if text.contains("'lensmodel'") {
         return Some(mrcal::read_camera(text).map(Cameras::One));
