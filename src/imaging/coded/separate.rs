@@ -12,6 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Matrix3, Point2};
 
 use super::detection::{self, ENOUGH_MARGIN_PX, levels, without_strays};
+use super::explain;
 use super::marker::{Fields, Marker, TAG_BORDERS, fields, grey_at, mapped, read, square_map};
 use super::numbering::{AGREEING, tolerated};
 use super::quads::{Quad, quads};
@@ -87,6 +88,9 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 Seen::Grid(_) if layout.is_some() => Err(said(Layout::Grid)),
                 Seen::Grid(detected) => Ok(detected),
                 Seen::Other(other) => Err(other),
+                Seen::Nothing if explain::is_unread(&refusal) => {
+                    Err(of_another_family(picture, &separate).unwrap_or(refusal))
+                }
                 Seen::WithSquares | Seen::Nothing => Err(refusal),
             }
         }

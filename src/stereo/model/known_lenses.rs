@@ -101,8 +101,8 @@ impl KnownLenses {
         self.cameras[side as usize].as_ref()
     }
 
-    /// The same for pictures of this size, which a lens of none has then. Pictures of another size than the lens's were
-    /// binned, cut or taken by another camera.
+    /// The same for these pictures: a lens whose file says no size has theirs. Pictures of another size than the lens's
+    /// were binned, cut or taken by another camera.
     pub fn of_pictures(self, corners: &Corners) -> Result<KnownLenses, Error> {
         let sizes = [corners.left_size, corners.right_size];
         let sized = |side: Side| {
