@@ -247,7 +247,8 @@ fn of_kind_seen(board: &Board, skipped: &[Skipped]) -> Option<String> {
     let (_, name) = most.filter(|(count, _)| !board.is_coded() || 2 * count > skipped.len())?;
     Some(match is_tags {
         true => {
-            format!("name it: `--board apriltag:COLUMNSxROWS:{name}:TAG:GAP`, counts in tags as printed, sizes in mm")
+            let kind = if name.starts_with("tag") { "apriltag" } else { "aruco" };
+            format!("name it: `--board {kind}:COLUMNSxROWS:{name}:TAG:GAP`, counts in tags as printed, sizes in mm")
         }
         false => format!(
             "name it: `--board charuco:COLUMNSxROWS:SQUARE:MARKER:{name}`, counts in squares as printed, sizes in mm"
@@ -300,12 +301,14 @@ mod tests {
     fn a_board_of_another_kind_is_named_as_far_as_it_is_read() {
         let markers = format!("{HAS_MARKERS}DICT_APRILTAG_36h11 in its squares");
         let tags = format!("{HAS_TAGS}tag25h9");
-        let (markers, tags, none) = (markers.as_str(), tags.as_str(), "no board found");
+        let aruco = format!("{HAS_TAGS}DICT_6X6_250");
+        let (markers, tags, aruco, none) = (markers.as_str(), tags.as_str(), aruco.as_str(), "no board found");
         let (plain, charuco, grid) =
             ("checker:9x7:20", "charuco:5x4:30:22:DICT_4X4_50", "apriltag:5x4:tag36h11:24:7.2");
         for (board, reasons, hint) in [
             (plain, [markers, none, none], "`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_APRILTAG_36h11`"),
             (plain, [tags, markers, tags], "`--board apriltag:COLUMNSxROWS:tag25h9:TAG:GAP`"),
+            (plain, [aruco, none, aruco], "`--board aruco:COLUMNSxROWS:DICT_6X6_250:TAG:GAP`"),
             (charuco, [tags, tags, none], "`--board apriltag:COLUMNSxROWS:tag25h9:TAG:GAP`"),
             (grid, [markers, none, markers], "`--board charuco:COLUMNSxROWS:SQUARE:MARKER:DICT_APRILTAG_36h11`"),
             // Something else beside a board that is not read.

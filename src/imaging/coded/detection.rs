@@ -13,7 +13,7 @@ use super::claim::{self, Claim};
 use super::in_grid::{faint_in, markers_in};
 use super::marker::{Fields, fields};
 use super::numbering::{Placement, Said};
-use super::{explain, faint, local_map, measures, numbering};
+use super::{explain, faint, local_map, measures, numbering, separate};
 use crate::imaging::Board;
 use crate::imaging::board::{Kind, Pitch, Print};
 use crate::imaging::detect::{Detected, Refusal, grids, on_a_copy, right_handed};
@@ -37,7 +37,7 @@ pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which
 /// What a picture shows that has a board with markers where one of another kind was looked for.
 pub const HAS_MARKERS: &str = "shows a board with markers of ";
 
-/// The same for a grid of tags.
+/// The same for a grid of tags, with black squares between them or without.
 pub const HAS_TAGS: &str = "shows a grid of tags of ";
 
 /// Whether a picture in which nothing of a board was read shows one of another kind with markers or tags.
@@ -52,7 +52,7 @@ pub fn of_other_kind(picture: &Picture, asked: &Board) -> Option<String> {
     let markers = (Pitch::Even, matches!(asked.kind, Kind::Charuco { .. }));
     let tags = (Pitch::Tags { gap: GAP }, matches!(asked.kind, Kind::Tags { .. }));
     let others = [markers, tags].into_iter().filter(|(_, is_asked)| !is_asked);
-    others.map(|(pitch, _)| pitch).find_map(|pitch| {
+    let in_grids = others.map(|(pitch, _)| pitch).find_map(|pitch| {
         let dictionary = levels(picture).take(COPIES).find_map(|level| {
             let mut found = grids_on((level, &level.copy(picture)), pitch, MARGIN, false).take(GRIDS);
             found.find_map(|grid| explain::dictionary_in(picture, &grid, pitch))
@@ -61,6 +61,10 @@ pub fn of_other_kind(picture: &Picture, asked: &Board) -> Option<String> {
             Pitch::Even => format!("{HAS_MARKERS}{} in its squares", dictionary.name()),
             Pitch::Tags { .. } => format!("{HAS_TAGS}{}", dictionary.said()),
         })
+    });
+    in_grids.or_else(|| {
+        let family = if tags.1 { None } else { separate::family_seen(picture) };
+        family.map(|family| format!("{HAS_TAGS}{}", family.said()))
     })
 }
 

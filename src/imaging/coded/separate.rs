@@ -13,7 +13,7 @@ use nalgebra::{Matrix3, Point2};
 
 use super::detection::{self, ENOUGH_MARGIN_PX, levels, without_strays};
 use super::explain;
-use super::marker::{Fields, Marker, TAG_BORDERS, fields, grey_at, mapped, read, square_map};
+use super::marker::{Fields, Marker, fields, grey_at, mapped, read, square_map};
 use super::numbering::{AGREEING, tolerated};
 use super::quads::{Quad, quads};
 use crate::imaging::Board;
@@ -63,7 +63,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 match detection::detect(picture, board.with_layout(Layout::Tags)) {
                     Ok(_) => Err(said(Layout::Tags)),
                     Err(_) if matches!(seen, Seen::WithSquares) => Err(said(Layout::Tags)),
-                    Err(_) => Err(of_another_family(picture, &board)
+                    Err(_) => Err(family::of_another(picture, &board)
                         .unwrap_or_else(|| "shows no tag of the board that can be read".to_owned().into())),
                 }
             }
@@ -89,7 +89,7 @@ pub fn detect(picture: &Picture, board: Board) -> Result<Detected, Refusal> {
                 Seen::Grid(detected) => Ok(detected),
                 Seen::Other(other) => Err(other),
                 Seen::Nothing if explain::is_unread(&refusal) => {
-                    Err(of_another_family(picture, &separate).unwrap_or(refusal))
+                    Err(family::of_another(picture, &separate).unwrap_or(refusal))
                 }
                 Seen::WithSquares | Seen::Nothing => Err(refusal),
             }
@@ -292,7 +292,7 @@ fn judged(picture: &Picture, board: &Board, tags: &[Tag], (level, copy): (Level,
     if !is_whole && !order.is_sure(tags.len().max(2)) {
         let others = (1..=MOST_COLUMNS).filter(|other| *other != columns).map(of);
         return match unlike(board, tags, others) {
-            Seen::Other(refusal) => Seen::Other(of_another_family(picture, board).unwrap_or(refusal)),
+            Seen::Other(refusal) => Seen::Other(family::of_another(picture, board).unwrap_or(refusal)),
             seen => seen,
         };
     }
@@ -325,41 +325,6 @@ fn laid(board: &Board, tags: &[Tag], by_number: &BTreeMap<usize, usize>, upside_
     })
 }
 
-/// What is said of a picture with tags of another family or dictionary, where more are read than chance finds.
-fn of_another_family(picture: &Picture, board: &Board) -> Option<Refusal> {
-    const COPIES: usize = 2;
-    const FEWEST: usize = 4;
-    let Kind::Tags { family, gap_mm, .. } = board.kind else { return None };
-    let gap = gap_mm / board.square_mm;
-    let ways = TAG_BORDERS.into_iter().flat_map(|border| (4..=7).map(move |bits| Fields::of_tag(gap, bits, border)));
-    let ways: Vec<Fields> = ways.collect();
-    let is_of = |marker: &Marker, family: Dictionary| {
-        let turns = [0, 1, 2, 3].map(|quarters| marker.turned(quarters).code);
-        (0..family.count()).any(|id| family.code(id).is_some_and(|code| turns.contains(&code)))
-    };
-    levels(picture).take(COPIES).find_map(|level| {
-        let shapes = quads(&level.copy(picture)).into_iter().map(|quad| quad.map(|p| level.to_picture(&p)));
-        let shapes: Vec<Quad> = shapes.collect();
-        let mut best: Option<(usize, Dictionary)> = None;
-        for fields in &ways {
-            let read = |quad: &Quad| read(picture, quad, *fields).filter(|marker| !marker.inverted);
-            let markers: Vec<Marker> = shapes.iter().filter_map(read).collect();
-            // The board's own first: others begin with the same markers.
-            let all = std::iter::once(family).chain(Dictionary::all());
-            for other in all.filter(|other| other.bits() == fields.bits) {
-                let known = markers.iter().filter(|marker| is_of(marker, other)).count();
-                let is_more = best.is_none_or(|(most, _)| known > most);
-                if is_more && known >= FEWEST && 2 * known > markers.len() {
-                    best = Some((known, other));
-                }
-            }
-        }
-        let (_, other) = best.filter(|(_, other)| *other != family)?;
-        let reason = format!("shows markers of {}, the board has those of {}", other.said(), family.said());
-        Some(Refusal { reason, seen: board.with_dictionary(other) })
-    })
-}
-
 const TWO_BOARDS: &str = "shows two boards with the same markers: cover one of them";
 
 /// Why tags are none of the board's.
@@ -388,5 +353,8 @@ fn unlike(board: &Board, tags: &[Tag], others: impl Iterator<Item = Order>) -> S
     }
 }
 
+mod family;
 #[cfg(test)]
 mod tests;
+
+pub use family::family_seen;

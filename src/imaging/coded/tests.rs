@@ -142,11 +142,25 @@ fn the_size_that_is_printed_is_told_whatever_was_asked_for() {
 #[test]
 fn a_grid_of_tags_is_told_whatever_its_gaps_are() {
     let plain: Board = "checker:20x20:10".parse().unwrap();
-    for (board, family) in
-        [(TAGS, Some("tag36h11")), ("apriltag:4x3:tag25h9:30:7.5", Some("tag25h9")), ("checker:9x7:20", None)]
-    {
+    let charuco: Board = "charuco:5x4:30:22:DICT_4X4_50".parse().unwrap();
+    for (board, family) in [
+        (TAGS, Some("tag36h11")),
+        ("apriltag:4x3:tag25h9:30:7.5", Some("tag25h9")),
+        ("apriltag:4x3:tag25h9:30:6:opencv", Some("tag25h9")),
+        ("apriltag:4x3:tag25h9:30:15:opencv", Some("tag25h9")),
+        ("aruco:4x3:DICT_6X6_250:30:7.5", Some("DICT_6X6_50")),
+        ("aruco:4x3:DICT_4X4_50:30:6", Some("DICT_4X4_50")),
+        ("checker:9x7:20", None),
+    ] {
         let (picture, _) = Shot::of(board, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
-        assert_eq!(of_other_kind(&picture, &plain), family.map(|family| format!("{HAS_TAGS}{family}")), "{board}");
+        for asked in [plain, charuco] {
+            assert_eq!(of_other_kind(&picture, &asked), family.map(|family| format!("{HAS_TAGS}{family}")), "{board}");
+        }
+    }
+    // Markers in squares are no grid, also where their board is not the one that is looked for.
+    for board in [BOARD, "charuco:6x5:30:18:DICT_4X4_50", "charuco:6x5:30:24:DICT_4X4_50"] {
+        let (picture, _) = Shot::of(board, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
+        assert_eq!(of_other_kind(&picture, &charuco), None, "{board}");
     }
 }
 
