@@ -297,7 +297,11 @@ impl Pairing {
         let mut parts = Vec::new();
         if !self.single.is_empty() {
             let pictures = count(self.single.len(), "picture");
-            parts.push(format!("{pictures} without a partner ({})", listed(&called(&self.single), 3)));
+            let in_order = match self.could_be_in_order {
+                true => ", as many on each side: `--pair-by order` pairs all in the order of their names",
+                false => "",
+            };
+            parts.push(format!("{pictures} without a partner ({}){in_order}", listed(&called(&self.single), 3)));
         }
         if self.sideless > 0 {
             parts.push(format!("{} whose names tell neither left nor right", count(self.sideless, "picture")));

@@ -65,9 +65,11 @@ impl Source<'_> {
         if let Some(others) = explain::not_taken(&reading, folders) {
             taken = format!("{taken}; {others}");
         }
-        let Reading { matched, sideless, aside, .. } = reading;
+        let Reading { matched, sideless, aside, sides: [left, right], .. } = reading;
         let place = self.places().iter().map(|p| p.as_str()).collect::<Vec<_>>().join(" and ").into();
-        Ok(Pairing { place, pairs: matched.pairs, taken, single: matched.single, sideless, aside })
+        let could_be_in_order = !matched.single.is_empty() && left.len() == right.len() && self.by.is_none();
+        let (pairs, single) = (matched.pairs, matched.single);
+        Ok(Pairing { place, pairs, taken, single, could_be_in_order, sideless, aside })
     }
 
     /// A second place that is no folder of pictures was perhaps meant for a flag.

@@ -117,6 +117,10 @@ tjresearch/research-aneesh_sai: calib_images
     11 pictures have no partner  ./: 11 pictures
 sebastiengilbert73/tutorial_calibrate_stereo_vision: red_square_images, one folder a camera
     camera_1/2023-01-02_{165050.931152,165050.993401,165051.063160}.png camera_2/2023-01-02_{165050.940113,165051.001270,165051.070007}.png
+    3 pairs from 2023-01-02_165050.931152 to 2023-01-02_165051.063160: left camera_1/2023-01-02_*.png
+# Nothing but the order.
+(the same, by another clock)
+    camera_1/2023-01-02_{165050.931152,165050.993401,165051.063160}.png camera_2/2023-01-02_{165050.965113,165051.031270,165051.096007}.png
     --pair-by order`";
 
 /// So many pairs, the name of the first and of the last, and what is said of the left pictures.

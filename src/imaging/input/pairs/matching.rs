@@ -1,5 +1,5 @@
 //! From the pictures of two sides to pairs: by equal names, by what is left without the word for the side, by number,
-//! or in their order.
+//! by time, or in their order.
 //!
 //! Out: pairs in natural order of their names, each with a name of its own, and the pictures without a partner. The
 //! first way that pairs most of the smaller side is taken, else the one that pairs most; what it leaves over may have
@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem, tokens};
-use super::{PairBy, PairFiles};
+use super::{PairBy, PairFiles, times};
 use crate::imaging::{Error, Result, Side};
 
 /// Two sides paired.
@@ -98,6 +98,14 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
             Err(_) if matches!(way, Way::NumbersOfForm | Way::LastNumber) => (),
             Err(e) => refused = refused.or(Some(e)),
         }
+    }
+    // Of times a few are equal by chance.
+    let by_time = || times::pair([left, right]).filter(|by_time| by_time.pairs.len() > best.pairs.len());
+    if by.is_none_or(|by| by == PairBy::Time)
+        && 2 * best.pairs.len() <= smaller
+        && let Some(by_time) = by_time()
+    {
+        return Ok(by_time);
     }
     match refused {
         Some(e) if best.pairs.is_empty() => Err(e),
@@ -259,7 +267,7 @@ fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
 }
 
 /// Names that are their own, and the order of them.
-fn finished(mut matched: Matched) -> Matched {
+pub fn finished(mut matched: Matched) -> Matched {
     for pair in &mut matched.pairs {
         if pair.pair.is_empty() {
             pair.pair = NAMELESS.to_owned();

@@ -20,6 +20,7 @@ mod readings;
 mod rivals;
 #[cfg(test)]
 mod tests;
+mod times;
 
 pub use names::natural_order;
 pub use pairing::{Halves, PairBy, PairFiles, Pairing, Source};

@@ -13,12 +13,14 @@ pub enum PairBy {
     Number,
     /// In the order of their names; as many left pictures as right ones
     Order,
+    /// By the times in their names, the nearest ones
+    Time,
 }
 
 impl PairBy {
     /// The word in messages.
     pub fn word(self) -> &'static str {
-        ["name", "number", "order"][self as usize]
+        ["name", "number", "order", "time"][self as usize]
     }
 }
 
@@ -41,7 +43,7 @@ pub struct Source<'a> {
     pub images: &'a Utf8Path,
     /// The folder of the right ones.
     pub right: Option<&'a Utf8Path>,
-    /// How they are paired; `None` is by name, else by number.
+    /// How they are paired; `None` is by name, else by number, else by time.
     pub by: Option<PairBy>,
     /// How each picture holds both views, if it does.
     pub halves: Option<Halves>,
@@ -86,6 +88,8 @@ pub struct Pairing {
     pub taken: String,
     /// Pictures of one side without the other.
     pub single: Vec<Utf8PathBuf>,
+    /// Whether both sides have as many pictures, some of them without a partner.
+    pub could_be_in_order: bool,
     /// Pictures whose names tell no side.
     pub sideless: usize,
     /// Files of these folders that are passed over.
