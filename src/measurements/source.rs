@@ -190,7 +190,7 @@ impl Source {
             let readings = layout::are_readings(parts, &picked);
             // Two that are nearly one may be where the robot was sent and what was measured there.
             let unsaid = picked.points.len() == 2 && !widened && self.columns.is_none();
-            let differ = !readings && layout::changes_distance(parts, first, second);
+            let differ = !readings && layout::differ(parts, first, second);
             if differ && widened {
                 return Err(unsettled::rows_of_pose(parts));
             }

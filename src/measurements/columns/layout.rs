@@ -10,6 +10,7 @@ use nalgebra::Point3;
 
 use super::part::{At, Part};
 use super::pick::Picked;
+use crate::geometry::fitted_frame;
 use crate::statistics::median;
 
 /// Columns of a file without names in which joints and points are looked for.
@@ -65,7 +66,7 @@ fn of_columns(parts: &[Part], picked: &Picked, count: usize, free: fn(&Part) -> 
         let of_points = |points: Vec<(String, [At; 3])>| Picked { joints: joints.clone(), points, ..picked.clone() };
         if total > 3 && total.is_multiple_of(3) {
             let all: Vec<[At; 3]> = rest.iter().flat_map(|of| of.chunks_exact(3)).map(|c| [c[0], c[1], c[2]]).collect();
-            let kept = all.windows(2).all(|two| is_kept(distances(parts, &two[0], &two[1])));
+            let kept = all.windows(2).all(|two| are_carried(&pairs(parts, &two[0], &two[1])));
             let whole = 3 * all.len() == total;
             let several = of_points(all.into_iter().enumerate().map(|(i, at)| ((i + 1).to_string(), at)).collect());
             // Two that are nearly one may be what was commanded and what was measured: without names only three or more
@@ -132,24 +133,53 @@ fn blocks(parts: &[Part], free: &[Vec<At>], count: usize, known: bool) -> Vec<Ve
     free.iter().flat_map(of_file).collect()
 }
 
-/// Whether two points are at other distances from row to row.
-pub(in crate::measurements) fn changes_distance(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
-    let apart = distances(parts, a, b);
-    apart.len() > 1 && !is_kept(apart)
+/// Whether no body carries both of two points.
+pub(in crate::measurements) fn differ(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> bool {
+    let pairs = pairs(parts, a, b);
+    pairs.len() > 1 && !are_carried(&pairs)
 }
 
-/// How far two points are from each other in the rows that have both.
-fn distances(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<f64> {
+/// Two points in the rows that have both.
+fn pairs(parts: &[Part], a: &[At; 3], b: &[At; 3]) -> Vec<[Point3<f64>; 2]> {
     let rows = parts[a[0].part].rows.len().min(parts[b[0].part].rows.len());
-    let apart = |row: usize| Some((point(parts, row, a)? - point(parts, row, b)?).norm());
-    (0..rows).take(ROWS).filter_map(apart).collect()
+    (0..rows).take(ROWS).filter_map(|row| Some([point(parts, row, a)?, point(parts, row, b)?])).collect()
+}
+
+/// Whether a body may carry both points: they keep their distance beside what they move by, and are not one point in
+/// two frames, where the robot was sent and what a sensor saw, which are far apart and keep about theirs.
+fn are_carried(pairs: &[[Point3<f64>; 2]]) -> bool {
+    let apart: Vec<f64> = pairs.iter().map(|[a, b]| (b - a).norm()).collect();
+    let scatter = scatter(&apart);
+    let moves = |of: usize| {
+        let points = pairs.iter().map(|pair| pair[of]).collect::<Vec<_>>();
+        let middle = Point3::from([0, 1, 2].map(|axis| median(points.iter().map(|p| p[axis])).unwrap_or_default()));
+        median(points.iter().map(|p| (p - middle).norm())).unwrap_or_default()
+    };
+    is_kept(apart) && scatter <= RIGID * moves(0).min(moves(1)) && !are_of_two_frames(pairs, scatter)
+}
+
+/// Whether a rigid transform takes the one point to the other several times as surely as they keep their distance. It
+/// does not where a body that turns carries them, and where it does not turn, what is left is what their distance
+/// scatters by, too.
+fn are_of_two_frames(pairs: &[[Point3<f64>; 2]], scatter: f64) -> bool {
+    const CLEAR: f64 = 4.0;
+    /// Of 18 numbers the transform takes six.
+    const FEWEST: usize = 6;
+    let frame = fitted_frame(pairs.iter().map(|[a, b]| (*a, *b, 1.0)));
+    let left = median(pairs.iter().map(|[a, b]| (frame * a - b).norm()));
+    pairs.len() >= FEWEST && left.is_some_and(|left| CLEAR * left < scatter)
+}
+
+/// How far numbers are from their middle, in the middle.
+fn scatter(numbers: &[f64]) -> f64 {
+    let middle = median(numbers.iter().copied()).unwrap_or_default();
+    median(numbers.iter().map(|number| (number - middle).abs())).unwrap_or(f64::INFINITY)
 }
 
 /// Whether these distances are one that is not zero, but for gross errors at less than half of the rows.
 pub(in crate::measurements) fn is_kept(apart: Vec<f64>) -> bool {
     let Some(middle) = median(apart.iter().copied()) else { return false };
-    let off = median(apart.iter().map(|d| (d - middle).abs())).unwrap_or(f64::INFINITY);
-    apart.len() > 1 && middle > 0.0 && off < RIGID * middle
+    apart.len() > 1 && middle > 0.0 && scatter(&apart) < RIGID * middle
 }
 
 pub(in crate::measurements) fn point(parts: &[Part], row: usize, at: &[At; 3]) -> Option<Point3<f64>> {
@@ -171,10 +201,29 @@ pub(in crate::measurements) fn are_readings(parts: &[Part], picked: &Picked) -> 
 #[cfg(test)]
 mod tests {
     use camino::Utf8Path;
-    use nalgebra::Rotation3;
+    use nalgebra::{Rotation3, Vector3};
 
     use super::*;
     use crate::measurements::columns::pick;
+
+    #[test]
+    fn one_point_in_two_frames_is_not_two_of_a_body() {
+        let turn = |k: f64| Rotation3::from_euler_angles((0.9 * k).sin(), 0.8 * (1.7 * k).cos(), (0.4 * k).sin());
+        let noise = |k: f64| Vector3::new((71.0 * k).sin(), (37.0 * k).sin(), (53.0 * k).cos()) * 0.1;
+        let at = |k: f64| Point3::new(800.0 + 90.0 * (2.1 * k).sin(), 60.0 * k.cos(), 500.0 + 80.0 * (1.3 * k).sin());
+        let frame = Rotation3::from_euler_angles(0.1, -0.05, 0.3);
+        let rows = |second: &dyn Fn(f64) -> Point3<f64>| -> Vec<[Point3<f64>; 2]> {
+            (0..30).map(f64::from).map(|k| [at(k), second(k) + noise(k)]).collect()
+        };
+        let two_frames = rows(&|k| frame * at(k) + Vector3::new(2500.0, -900.0, 40.0));
+        assert!(is_kept(two_frames.iter().map(|[a, b]| (b - a).norm()).collect()) && !are_carried(&two_frames));
+        for offset in [Vector3::new(60.0, 0.0, 0.0), Vector3::new(0.0, -30.0, 200.0)] {
+            assert!(are_carried(&rows(&|k| at(k) + turn(k) * offset)), "{offset}");
+            assert!(are_carried(&rows(&|k| at(k) + offset)), "a body that does not turn, {offset}");
+        }
+        // Other numbers may be far apart by about as much in all rows.
+        assert!(!are_carried(&rows(&|k| Point3::new(21.0 + (3.0 * k).sin(), 3000.0 + (5.0 * k).cos(), 2.0))));
+    }
 
     /// A file of transforms, in which the rotations' entries are as many numbers side by side as a robot has joints.
     #[test]
