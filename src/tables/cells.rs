@@ -54,9 +54,11 @@ pub(super) fn named(text: &str) -> Option<Vec<(u64, Fields)>> {
     (rows.len() > 2).then_some(rows)
 }
 
+/// What a comment begins with.
+const MARKS: [&str; 2] = ["#", "//"];
+
 /// The cells of a line before a comment that stands behind a number; between `blanks` its mark is a cell of its own.
 fn without_comment(cells: &Fields, blanks: bool) -> Option<Fields> {
-    const MARKS: [&str; 2] = ["#", "//"];
     let before = |cell: &str| {
         let (number, rest) = cell.split_once(char::is_whitespace)?;
         let number = number.replace(',', ".");
@@ -70,8 +72,11 @@ fn without_comment(cells: &Fields, blanks: bool) -> Option<Fields> {
 /// Makes columns of lists as many columns, takes units behind numbers to the names and comments away; `blanks` stand
 /// between the cells.
 pub(super) fn plain(rows: &mut Vec<(u64, Fields)>, blanks: bool) {
+    // A column may be called `#`.
+    let is_marked = |row: &Fields| row.iter().any(|cell| MARKS.contains(&cell));
+    let usual = rows.iter().rev().map(|(_, row)| row).find(|row| !is_marked(row)).map(Fields::len);
     for (_, row) in rows.iter_mut() {
-        if let Some(before) = without_comment(row, blanks) {
+        if let Some(before) = without_comment(row, blanks && Some(row.len()) != usual) {
             *row = before;
         }
     }
@@ -201,5 +206,23 @@ fn without_unit(name: &str) -> (&str, Option<&str>) {
     match (at, unit) {
         (Some(at), Some(unit)) if Unit::of(unit).is_some() => (name[..at].trim_end_matches(['_', ' ']), Some(unit)),
         _ => (name, None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_comment_stands_behind_the_cells_of_a_row() {
+        let read = |lines: &[&str]| {
+            let mut rows: Vec<(u64, Fields)> =
+                lines.iter().zip(1..).map(|(line, number)| (number, Fields::new(line.split_whitespace()))).collect();
+            plain(&mut rows, true);
+            rows.iter().map(|(_, row)| row.iter().collect::<Vec<_>>().join(" ")).collect::<Vec<_>>()
+        };
+        assert_eq!(read(&["a b # of me", "1 2 # again", "3 4"]), ["a b", "1 2", "3 4"]);
+        // A column that is called by its mark.
+        assert_eq!(read(&["a # b", "1 2 3", "4 5 6"]), ["a # b", "1 2 3", "4 5 6"]);
     }
 }

@@ -128,7 +128,7 @@ fn is_comment(row: &Fields) -> bool {
 
 /// Whether a row above the numbers is a comment that names no columns.
 fn is_remark(row: &Fields, width: usize) -> bool {
-    if row.len() == 1 {
+    if row.iter().skip(1).all(|cell| cell.trim().is_empty()) {
         return is_comment(row) && without_title(vec![row[0].to_owned()], width).is_none();
     }
     let unknown = |cell: &str| Name::of(cell).what == What::Other;
@@ -317,7 +317,9 @@ mod tests {
         assert_eq!(read(&format!("a,b,c\n{rows}# pause; then on\n1,2,3\n% end\n")).unwrap().rows.len(), 4);
         assert_eq!(names("0,1,2,3\n1.5,2,3,4\n"), None);
         assert_eq!(names(",0,1,2,3\n0,1.5,2,3,4\n1,2.5,3,4,5\n"), None);
-        for title in ["Units: mm", "// exported by the tracker", "# 3 columns"] {
+        for title in
+            ["Units: mm", "// exported by the tracker", "# 3 columns", "# measured by Ada in May,,", "# today,"]
+        {
             assert_eq!(names(&format!("{title}\n{rows}")), None, "{title}");
         }
         for header in ["a b c", "# a\tb\tc", "a;b;c"] {

@@ -246,7 +246,7 @@ fn axis(c: char) -> Option<usize> {
     "xyz".find(c)
 }
 
-/// `x`, `px`, `xm`, `x_1`, `tracker x`.
+/// `x`, `px`, `xm`, `x_1`, `Lx` of a laser, `tracker x`.
 fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
     let single = |i: &usize| {
         let (first, rest) = words[*i].split_at_checked(1)?;
@@ -255,7 +255,7 @@ fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
         let marks = rest.chars().count() == 1 || is_in(MEASURED, rest) || is_in(COMMANDED, rest);
         match (letter(first), letter(rest)) {
             (Some(a), None) if rest.is_empty() || marks => Some((a, Some(rest).filter(|rest| !rest.is_empty()))),
-            (None, Some(a)) if "pmtc".contains(first) => Some((a, Some(first).filter(|f| *f == "m"))),
+            (None, Some(a)) if "pmtcl".contains(first) => Some((a, Some(first).filter(|f| "ml".contains(*f)))),
             _ => None,
         }
     };
@@ -265,6 +265,10 @@ fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
     let found: Vec<(usize, (usize, Option<&str>))> =
         (0..words.len()).filter(|&i| !size(i)).filter_map(|i| Some((i, single(&i)?))).collect();
     let [(at, (axis, mark))] = found[..] else { return None };
+    // Parts of a quaternion, of a matrix, of a speed: `q_x`, `o_x`, `w_x`.
+    if words.iter().any(|word| matches!(word.as_str(), "q" | "o" | "w")) {
+        return None;
+    }
     let mut rest = without(words, &[at]);
     rest.extend(mark.map(String::from));
     Some((What::Coordinate(axis), rest))
@@ -365,6 +369,10 @@ mod tests {
             "Xsoll",
         ] {
             assert_eq!((what(name).0, what(name).2), (What::Coordinate(0), Some(false)), "{name}");
+        }
+        assert_eq!((what("Lx"), Name::of("Lx").key), ((What::Coordinate(0), None, None), vec!["l".to_owned()]));
+        for name in ["q_x", "Q.z", "quat_x", "qx", "tcp q_y", "w_x"] {
+            assert_eq!(what(name).0, What::Other, "{name}");
         }
         for name in ["U(95) X  [mm]", "x_dif", "Rx", "rx", "dx", "vx", "x error", "fx"] {
             assert_eq!(what(name).0, What::Other, "{name}");

@@ -85,7 +85,22 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
     if let Some(hint) = foreign::of_yaml(&text, &file) {
         return Err(refuse(&file, format!("{what}: a YAML file, which is not read"), Some(&hint)));
     }
-    Ok(Source::Text(text, encoding))
+    Ok(Source::Text(without_numpy(text), encoding))
+}
+
+/// A text with the numbers that numpy 2 writes as `np.float64(1.5)` where it writes lists.
+fn without_numpy(text: String) -> String {
+    let mut parts = text.split("np.float");
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let number =
+            part.strip_prefix("64(").or_else(|| part.strip_prefix("32(")).and_then(|rest| rest.split_once(')'));
+        match number {
+            Some((number, rest)) => plain.extend([number, rest]),
+            None => plain.extend(["np.float", part]),
+        }
+    }
+    plain
 }
 
 fn refuse(path: &Utf8Path, message: String, hint: Option<&str>) -> Error {
@@ -217,6 +232,8 @@ mod tests {
         let (_folder, lines) = crate::files::temporary("lines.csv", b"j1,x\0\r\n1,2\0\r\n");
         let Ok(Source::Text(text, None)) = read(&lines, "the table", "") else { panic!("not read") };
         assert_eq!(text.lines().collect::<Vec<_>>(), ["j1,x", "1,2"]);
+        let numpy = "1,np.float64(2.5),[np.float32(3), np.float64(-4e-3)]\nnp.float64(5,np.floats\n".to_owned();
+        assert_eq!(without_numpy(numpy), "1,2.5,[3, -4e-3]\nnp.float64(5,np.floats\n");
         assert!(refused("a.csv", b"\x00\x01\x02\xffabc").contains("no spreadsheet"));
         assert!(refused("a.xlsx", b"PK\x03\x04 nothing").contains("not readable as a spreadsheet"));
     }
