@@ -274,18 +274,30 @@ fn by_commas(mut inside: &str) -> Vec<&str> {
     }
 }
 
-/// The parameters in the order in which a line names them, one behind the other: four, or three without theta.
+/// The parameters in the order in which a line names them, one behind the other: four, or three without theta. Where
+/// letters name them, words beside these say the same: `link offset d`.
 fn order(line: &str, width: usize) -> Option<Vec<&'static str>> {
-    const INDICES: [&str; 9] = ["i", "j", "n", "rad", "deg", "m", "mm", "offset", "link"];
+    order_by(line, width, false).or_else(|| order_by(line, width, true))
+}
+
+fn order_by(line: &str, width: usize, by_words: bool) -> Option<Vec<&'static str>> {
+    const INDICES: [&str; 8] = ["i", "j", "n", "rad", "deg", "m", "mm", "link"];
     let name = |word: &String| match word.as_str() {
         "alpha" | "α" => Some("alpha"),
         "a" | "r" => Some("a"),
         "theta" | "θ" | "q" => Some("theta"),
         "d" => Some("d"),
+        "twist" if by_words => Some("alpha"),
+        "length" if by_words => Some("a"),
+        "angle" if by_words => Some("theta"),
+        "offset" if by_words => Some("d"),
         _ => None,
     };
     let (words, _) = names::words(line);
-    let says = |w: &&String| !INDICES.contains(&w.as_str()) && w.parse::<f64>().is_err();
+    let is_index = |w: &String| {
+        INDICES.contains(&w.as_str()) || w == if by_words { "joint" } else { "offset" } || w.parse::<f64>().is_ok()
+    };
+    let says = |w: &&String| !is_index(w);
     let found: Vec<Option<&'static str>> = words.iter().filter(says).map(name).collect();
     let wanted: &[&'static str] = if width == 3 { &["alpha", "a", "d"] } else { &["alpha", "a", "theta", "d"] };
     let all = |window: &&[Option<&'static str>]| wanted.iter().all(|n| window.contains(&Some(n)));

@@ -70,6 +70,14 @@ fn a_table_in_brackets_has_its_order_in_a_comment() {
     let matlab = "%   a(i-1)  alpha(i-1)  d(i)  theta_offset\nDH = [0, 0, 77, 0;      % 1\n      0, -pi/2, 0, -pi/2; % 2\n      128, 0, 0, pi/2];\n";
     let found = table(matlab).unwrap().unwrap();
     assert_eq!((found.names, &found.rows[2].1[3]), (Some(vec!["a", "alpha", "d", "theta"]), "pi/2"));
+    for words in [
+        "twist length theta_i offset",
+        "Link Twist, Link Length, Joint Angle, Link Offset",
+        "twist (α), length (a), θ, offset (d)",
+    ] {
+        let found = table(&format!("{words}\n0 0 0 77\n-90 0 -90 0\n0 128 90 0\n")).unwrap().unwrap();
+        assert_eq!(found.names, Some(vec!["alpha", "a", "theta", "d"]), "{words}");
+    }
     for text in ["x = [1, 2, 3, 4]\n", ""] {
         assert_eq!(table(text), Ok(None), "{text}");
     }
