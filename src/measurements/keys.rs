@@ -26,12 +26,14 @@ struct Key {
 }
 
 impl Key {
-    fn of(part: usize, file: &Part) -> Option<Key> {
+    fn of(part: usize, parts: &[Part]) -> Option<Key> {
+        let file = &parts[part];
         if file.rows.is_empty() || file.is_program() && file.label().is_none() {
             return None;
         }
         let own = file.meanings.iter().flatten().position(|name| name.what == What::Own("pose"));
         let named = own.or_else(|| file.names.iter().flatten().position(|name| is_naming(name)));
+        let named = named.or_else(|| (0..file.width()).find(|&column| is_named_alike(parts, part, column)));
         let bare = file.names.as_ref().is_none_or(|names| names[0].is_empty());
         // Without names of columns what a row belongs to may stand before its label.
         let labels = (1..file.width()).filter(|&column| file.names.is_none() && file.kinds[column] == Kind::Words);
@@ -80,6 +82,28 @@ impl Key {
     }
 }
 
+/// Whether a column calls each of the rows by a name of its own, and another file has a column of the same name with
+/// most of these: those of times differ.
+fn is_named_alike(parts: &[Part], part: usize, column: usize) -> bool {
+    let calls = |file: &Part, column: usize| -> Option<BTreeSet<String>> {
+        let is_other = file.meanings.as_ref()?[column].what == What::Other;
+        let all = names(file, column).filter(|_| is_other)?;
+        let is_name = |name: &String| name.chars().all(|c| c.is_ascii_digit()) || name.parse::<f64>().is_err();
+        let count = all.len();
+        let all: BTreeSet<String> = all.into_iter().filter(is_name).collect();
+        (all.len() == count).then_some(all)
+    };
+    let name = |file: &Part, column: usize| Some(file.names.as_ref()?[column].trim().to_lowercase());
+    let own = name(&parts[part], column).filter(|name| !name.is_empty());
+    let Some((own, called)) = own.zip(calls(&parts[part], column)) else { return false };
+    let is_alike = |(file, at): (&Part, usize)| {
+        let of = calls(file, at).filter(|_| name(file, at).as_ref() == Some(&own));
+        of.is_some_and(|of| 2 * of.intersection(&called).count() >= of.len().min(called.len()))
+    };
+    let others = parts.iter().enumerate().filter(|(other, _)| *other != part).map(|(_, file)| file);
+    others.flat_map(|file| (0..file.width()).map(move |at| (file, at))).any(is_alike)
+}
+
 /// The names in a column, numbers without what all labels have before them; `None` where a row has none.
 fn names(file: &Part, column: usize) -> Option<Vec<String>> {
     let cells: Vec<&str> = file.rows.iter().map(|(_, row)| row[column].trim()).collect();
@@ -111,7 +135,7 @@ fn is_naming(name: &str) -> bool {
 
 /// Puts the rows of all files that name them in one order; says what was done where they stand otherwise.
 pub(super) fn align(parts: &mut [Part]) -> Result<Option<String>> {
-    let keys: Vec<Key> = parts.iter().enumerate().filter_map(|(i, part)| Key::of(i, part)).collect();
+    let keys: Vec<Key> = (0..parts.len()).filter_map(|part| Key::of(part, parts)).collect();
     let least = keys.iter().filter(|key| key.is_distinct()).min_by_key(|key| key.names.len());
     let Some(first) = least.filter(|_| keys.len() > 1) else { return Ok(None) };
     let others: Vec<&Key> = keys.iter().filter(|key| key.part != first.part).collect();

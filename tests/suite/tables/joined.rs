@@ -300,3 +300,26 @@ fn points_of_an_export_are_joined_with_a_programs_targets_by_their_names() {
     same(&found, &rows, "in their order");
     assert!(said.iter().any(|said| said.contains("the rows are paired in their order")), "{said:?}");
 }
+
+#[test]
+fn columns_of_one_name_join_files_where_they_name_the_same_rows() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let shuffled: Vec<usize> = (0..30).map(|i| (7 * i + 3) % 30).collect();
+    for (first, second, letters) in [("Spot", "spot", "S"), ("Spot", "Spot", ""), ("stamp", "stamp", "t")] {
+        let is_of_rows = first != "stamp";
+        let called = |i: usize| format!("{letters}{}", i + 1);
+        // Times are other ones in both files.
+        let later = |i: usize| if is_of_rows { called(i) } else { called(1000 + i) };
+        let order: Vec<usize> = if is_of_rows { shuffled.clone() } else { (0..30).collect() };
+        let named = |list: Vec<(usize, String)>| tables(&folder, &rows, &list, &list, true);
+        let [q, _] = named((0..30).map(|i| (i, called(i))).collect());
+        let joints = folder.file("a.csv", std::fs::read_to_string(&q).unwrap().replacen("pose", first, 1));
+        let [_, p] = named(order.iter().map(|&i| (i, later(i))).collect());
+        let points = folder.file("b.csv", std::fs::read_to_string(&p).unwrap().replacen("pose", second, 1));
+        let (found, said) = source(&[&joints, &points]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+        same(&found, &rows, first);
+        assert_eq!(said.iter().any(|said| said.contains("rows joined by `Spot`")), is_of_rows, "{said:?}");
+        assert!(!said.iter().any(|said| said.contains("in their order;")), "{said:?}");
+    }
+}
