@@ -25,7 +25,7 @@ pub struct Pairs {
     /// Folder of the right camera's pictures, where the first one holds the left camera's alone
     #[arg(value_name = "RIGHT")]
     pub right: Option<Utf8PathBuf>,
-    /// How pictures are paired [default: names, else the numbers in them]
+    /// How pictures are paired [default: names, else the numbers in them, else times]
     #[arg(long, value_name = "HOW", conflicts_with_all = ["side_by_side", "top_bottom"])]
     pub pair_by: Option<PairBy>,
     /// Each picture holds both views: its left half is the left camera's

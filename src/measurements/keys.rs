@@ -128,7 +128,7 @@ pub(super) fn label(part: &Part) -> Option<usize> {
 }
 
 /// Whether a column's name says that it numbers or names the rows.
-fn is_naming(name: &str) -> bool {
+pub(super) fn is_naming(name: &str) -> bool {
     let words = words(name).0;
     !words.is_empty() && words.iter().all(|word| NAMING.split(' ').any(|known| known == word))
 }

@@ -6,6 +6,7 @@ mod columns;
 mod copies;
 mod given;
 mod keys;
+mod pose_list;
 mod readings;
 mod rows;
 pub mod source;
@@ -15,6 +16,7 @@ mod summaries;
 pub use crate::csv_table::quoted;
 pub use columns::is_not_near;
 pub use given::Given;
+pub(crate) use pose_list::read_pose_list;
 pub use rows::{
     Measurement, Observed, RobotPose, Role, pose_fields, pose_header, poses_csv, read, read_poses, reading_name,
 };

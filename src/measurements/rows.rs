@@ -143,7 +143,7 @@ impl Table<'_> {
     }
 
     /// The robot's poses, one a row. With a column `target`, rows of several targets may be of one pose.
-    fn poses(&self, target: Option<usize>) -> Result<Vec<RobotPose>> {
+    pub(super) fn poses(&self, target: Option<usize>) -> Result<Vec<RobotPose>> {
         let (pose, role) = (self.column("pose"), self.column("role"));
         let group = self.group_column()?;
         let numbers: Vec<String> =

@@ -32,7 +32,8 @@ pub fn run(args: &Measure, config: &Config, run: Run) -> Result<Outcome> {
     let source = args.pairs.source("measure", &args.poses);
     let list = list_of_poses(&source);
     let (known, RigDoubts { said: doubts, status, .. }) = knowledge(args, config, &rig_file)?;
-    let poses = measurements::read_poses(&list)?;
+    let (poses, taken) = measurements::read_pose_list(&list)?;
+    taken.iter().for_each(progress::note);
     if args.watch {
         let wanted = Wanted {
             board: known.board,
@@ -95,11 +96,14 @@ fn calibrated_by(pairs: &[PairFiles], rig_file: &Utf8Path) -> Option<String> {
     })
 }
 
+/// What a list of poses is called.
+const LISTS: [&str; 3] = ["poses.csv", "poses.xlsx", "poses.txt"];
+
 /// Where the poses are: in the folder of the pictures; of two folders in the one that holds both, else in one of them.
 fn list_of_poses(source: &Source<'_>) -> Utf8PathBuf {
     let both = source.right.and_then(|right| source.images.ancestors().find(|above| right.starts_with(above)));
     let places = both.into_iter().chain(source.places());
-    let mut lists = places.map(|place| place.join("poses.csv"));
+    let mut lists = places.flat_map(|place| LISTS.map(|name| place.join(name)));
     let first = both.unwrap_or(source.images).join("poses.csv");
     lists.find(|list| list.is_file()).unwrap_or(first)
 }
