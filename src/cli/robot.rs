@@ -19,7 +19,7 @@ pub struct Identify {
     /// The nominal robot [default: robot.toml in the working directory if there, else Table 1 of the paper]
     #[arg(long, value_name = "FILE")]
     pub robot: Option<Utf8PathBuf>,
-    /// Distances between touched points: group_a,group_b,distance_mm and optionally sigma_mm
+    /// Distances between touched points: two columns of groups, and their distance; optionally sigma_mm
     #[arg(long, value_name = "FILE")]
     pub known_distances: Option<Utf8PathBuf>,
     /// Solver; `auto` runs all and keeps the best; key `identify.method` [default: auto]
@@ -82,7 +82,7 @@ pub struct Verify {
     /// With --against: replace files that stereocal did not write, or that were changed since
     #[arg(long, requires = "against")]
     pub force: bool,
-    /// Distances between touched points: group_a,group_b,distance_mm and optionally sigma_mm
+    /// Distances between touched points: two columns of groups, and their distance; optionally sigma_mm
     #[arg(long, value_name = "FILE")]
     pub known_distances: Option<Utf8PathBuf>,
     /// Print the result as JSON
