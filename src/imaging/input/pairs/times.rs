@@ -43,7 +43,7 @@ pub fn pair(sides: [&[Utf8PathBuf]; 2]) -> Option<Matched> {
             .into_iter()
             .flatten()
             .peekable();
-            others.peek().is_some() && others.all(|(other, _)| CLEAR * apart <= other)
+            others.peek().is_some() && others.all(|(other, _)| CLEAR * apart <= other && apart < other)
         });
         let path = &sides[0][i];
         match partner {
@@ -152,6 +152,7 @@ mod tests {
             said(&["83342982396100", "83343911497400"], &["83218230747000", "83224084311800"]).unwrap().0.len(),
             0
         );
+        assert_eq!(said(&["a_1617181720", "b_1617181720"], &["1617181720", "1617181799"]).unwrap().0.len(), 0);
         // Of one picture a side nothing says how near is near.
         assert_eq!(said(&["WIN_20230401_12_30_15_Pro"], &["WIN_20230401_12_30_16_Pro"]).unwrap().0.len(), 0);
         assert!(said(&["img_1", "img_3"], &["img_2", "img_4"]).is_none());
