@@ -298,7 +298,9 @@ fn order_by(line: &str, width: usize, by_words: bool) -> Option<Vec<&'static str
         INDICES.contains(&w.as_str()) || w == if by_words { "joint" } else { "offset" } || w.parse::<f64>().is_ok()
     };
     let says = |w: &&String| !is_index(w);
-    let found: Vec<Option<&'static str>> = words.iter().filter(says).map(name).collect();
+    let mut found: Vec<Option<&'static str>> = words.iter().filter(says).map(name).collect();
+    // `offset (d)` is one.
+    found.dedup_by(|a, b| by_words && a == b);
     let wanted: &[&'static str] = if width == 3 { &["alpha", "a", "d"] } else { &["alpha", "a", "theta", "d"] };
     let all = |window: &&[Option<&'static str>]| wanted.iter().all(|n| window.contains(&Some(n)));
     if wanted.len() == 3 && found.contains(&Some("theta")) {

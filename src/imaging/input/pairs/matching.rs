@@ -99,11 +99,11 @@ pub fn pair(left: &[Utf8PathBuf], right: &[Utf8PathBuf], by: Option<PairBy>) -> 
             Err(e) => refused = refused.or(Some(e)),
         }
     }
-    // Of times a few are equal by chance.
-    let by_time = || times::pair([left, right]).filter(|by_time| by_time.pairs.len() > best.pairs.len());
+    // Of times a few are equal by chance, and a few are near.
+    let most = |pairs: usize| 2 * pairs > smaller;
     if by.is_none_or(|by| by == PairBy::Time)
-        && 2 * best.pairs.len() <= smaller
-        && let Some(by_time) = by_time()
+        && !most(best.pairs.len())
+        && let Some(by_time) = times::pair([left, right]).filter(|by_time| most(by_time.pairs.len()))
     {
         return Ok(by_time);
     }
