@@ -102,7 +102,7 @@ mod tests {
         };
         let own = "group_a,group_b,distance_mm,sigma_mm\ns1,s5,250.5,0.02\ns2,s3,100,\n";
         let expected = read(own).unwrap();
-        assert_eq!(expected.iter().map(|k| (k.a, k.b)).collect::<Vec<_>>(), [(0, 4), (1, 2)]);
+        assert_eq!(expected.iter().map(|k| (k.a, k.b)).collect::<Vec<_>>(), [(1, 5), (2, 3)]);
         let without_sigma = expected.iter().map(|k| KnownDistance { stated_sigma_mm: None, ..*k }).collect::<Vec<_>>();
         for text in [
             "from;to;distance\ns1;s5;250,5\ns2;s3;100\n",
