@@ -7,66 +7,25 @@
 //! are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is named
 //! where the markers tell (`explain`).
 
-use nalgebra::Point2;
-
 use super::claim::{self, Claim};
+use super::copies::{ENOUGH_MARGIN_PX, grids_on, levels, without_strays};
 use super::in_grid::{faint_in, markers_in};
 use super::marker::{Fields, fields};
 use super::numbering::{Placement, Said};
-use super::{explain, faint, local_map, measures, numbering, separate};
+use super::other_kind::of_other_kind;
+use super::{explain, faint, measures, numbering};
 use crate::imaging::Board;
-use crate::imaging::board::{Kind, Pitch, Print};
-use crate::imaging::detect::{Detected, Refusal, grids, on_a_copy, right_handed};
-use crate::imaging::image::pyramid::{Level, to_full_size};
+use crate::imaging::board::Print;
+use crate::imaging::detect::{Detected, Refusal, on_a_copy};
+use crate::imaging::image::pyramid::Level;
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
 
-/// Squares of so many px of a copy have a margin of so many px round their markers at least: on finer copies nothing
-/// more is seen.
-pub const ENOUGH_MARGIN_PX: f64 = 5.0;
-/// Copies with so many pixels may be enlarged.
-const MOST_DOUBLED_PX: usize = 4_000_000;
-/// How far from where its neighbours have it a corner may lie, in sides of a square.
-const STRAY: f64 = 0.2;
 /// Grids that are looked at on a copy, the largest first.
 const MOST_GRIDS: usize = 12;
 
 /// Why a part of a board has no number where the layout alone would give it one.
 pub const BY_LAYOUT: &str = "shows markers, but none at the board's sides: which corners they are depends on the layout, OpenCV's before or since 4.6";
-
-/// What a picture shows that has a board with markers where one of another kind was looked for.
-pub const HAS_MARKERS: &str = "shows a board with markers of ";
-
-/// The same for a grid of tags, with black squares between them or without.
-pub const HAS_TAGS: &str = "shows a grid of tags of ";
-
-/// Whether a picture in which nothing of a board was read shows one of another kind with markers or tags.
-pub fn of_other_kind(picture: &Picture, asked: &Board) -> Option<String> {
-    /// Copies and grids that are looked at: markers that number a board are on the largest of them.
-    const COPIES: usize = 2;
-    const GRIDS: usize = 3;
-    /// Most markers leave at least as much of a square free on each side, and borders of tags are wider.
-    const MARGIN: f64 = 0.1;
-    /// What Kalibr prints; grids of other gaps are found as long as they are not far from it.
-    const GAP: f64 = 0.3;
-    let markers = (Pitch::Even, matches!(asked.kind, Kind::Charuco { .. }));
-    let tags = (Pitch::Tags { gap: GAP }, matches!(asked.kind, Kind::Tags { .. }));
-    let others = [markers, tags].into_iter().filter(|(_, is_asked)| !is_asked);
-    let in_grids = others.map(|(pitch, _)| pitch).find_map(|pitch| {
-        let dictionary = levels(picture).take(COPIES).find_map(|level| {
-            let mut found = grids_on((level, &level.copy(picture)), pitch, MARGIN, false).take(GRIDS);
-            found.find_map(|grid| explain::dictionary_in(picture, &grid, pitch))
-        })?;
-        Some(match pitch {
-            Pitch::Even => format!("{HAS_MARKERS}{} in its squares", dictionary.name()),
-            Pitch::Tags { .. } => format!("{HAS_TAGS}{}", dictionary.said()),
-        })
-    });
-    in_grids.or_else(|| {
-        let family = if tags.1 { None } else { separate::family_seen(picture) };
-        family.map(|family| format!("{HAS_TAGS}{}", family.said()))
-    })
-}
 
 /// A part of the board in a picture.
 struct Part {
@@ -152,39 +111,6 @@ fn parts_on(
         }
     }
     Ok(parts)
-}
-
-/// Copies in their order: from coarse to fine.
-pub fn levels(picture: &Picture) -> impl Iterator<Item = Level> + use<> {
-    let doubled = (picture.width() * picture.height() <= MOST_DOUBLED_PX).then_some(Level::Doubled);
-    to_full_size(picture).chain(doubled)
-}
-
-/// The grids of corners on a copy as they lie in the picture, the largest first.
-fn grids_on(
-    (level, copy): (Level, &Grey8),
-    pitch: Pitch,
-    margin: f64,
-    foreshortened: bool,
-) -> impl Iterator<Item = Places> + use<> {
-    let in_picture = move |grid: Places| without_strays(right_handed(grid.map(|p| level.to_picture(p))), pitch);
-    grids(copy, pitch, margin, foreshortened).into_iter().map(in_picture)
-}
-
-/// The grid without corners that lie elsewhere than their neighbours say, the worst first.
-pub fn without_strays(mut grid: Places, pitch: Pitch) -> Places {
-    loop {
-        let Some(step) = grid.side_px(pitch) else { return grid };
-        let off = |(col, row, p): (usize, usize, &Point2<f64>)| {
-            let at = local_map::predicted(&grid, pitch, (col as isize, row as isize))?;
-            Some(((at - p).norm() / step, row * grid.columns + col))
-        };
-        let worst = grid.iter().filter_map(off).max_by(|a, b| a.0.total_cmp(&b.0));
-        match worst {
-            Some((off, at)) if off > STRAY => grid.cells[at] = None,
-            _ => return grid,
-        }
-    }
 }
 
 /// A grid as a part of the board; else what its markers say.

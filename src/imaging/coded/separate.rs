@@ -11,7 +11,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point2};
 
-use super::detection::{self, ENOUGH_MARGIN_PX, levels, without_strays};
+use super::copies::{ENOUGH_MARGIN_PX, levels, without_strays};
+use super::detection;
 use super::explain;
 use super::marker::{Fields, Marker, fields, grey_at, mapped, read, square_map};
 use super::numbering::{AGREEING, tolerated};

@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 
 use nalgebra::Point2;
 
-use super::super::detection::levels;
+use super::super::copies::levels;
 use super::super::marker::{Fields, Marker, TAG_BORDERS, mapped, read, square_map};
 use super::super::quads::{Quad, quads};
 use crate::imaging::board::dictionary::Dictionary;

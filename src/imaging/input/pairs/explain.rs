@@ -3,7 +3,7 @@
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder, list};
-use super::matching::Matched;
+use super::matched::Matched;
 use super::names::{Open, Reach, stem};
 use super::readings::{Reading, Told};
 use super::{Halves, PairBy, Pairing, Source};

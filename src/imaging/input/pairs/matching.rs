@@ -5,28 +5,14 @@
 //! first way that pairs most of the smaller side is taken, else the one that pairs most; what it leaves over may have
 //! another naming that pairs it. Goes wrong: two pictures of a side that would be the same one of a pair.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use camino::{Utf8Path, Utf8PathBuf};
 
+use super::matched::{Matched, finished};
 use super::names::{Open, Reach, SEPARATORS, natural_order, numbers, stem, tokens};
 use super::{PairBy, PairFiles, times};
 use crate::imaging::{Error, Result, Side};
-
-/// Two sides paired.
-#[derive(Debug, Clone)]
-pub struct Matched {
-    pub by: PairBy,
-    /// How those were paired that are named in another way than most.
-    pub also: Option<PairBy>,
-    /// In natural order of their names.
-    pub pairs: Vec<PairFiles>,
-    /// Pictures without a partner.
-    pub single: Vec<Utf8PathBuf>,
-}
-
-/// Name of a pair whose files are called by nothing but their side.
-const NAMELESS: &str = "left-right";
 
 /// The ways of telling which pictures belong together, in the order they are tried.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -264,21 +250,4 @@ fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
         Vec::new()
     };
     Matched { by: PairBy::Order, also: None, pairs, single: Vec::new() }
-}
-
-/// Names that are their own, and the order of them.
-pub fn finished(mut matched: Matched) -> Matched {
-    for pair in &mut matched.pairs {
-        if pair.pair.is_empty() {
-            pair.pair = NAMELESS.to_owned();
-        }
-    }
-    let names: BTreeSet<&str> = matched.pairs.iter().map(|p| p.pair.as_str()).collect();
-    if names.len() < matched.pairs.len() {
-        for pair in &mut matched.pairs {
-            pair.pair = stem(&pair.left).to_owned();
-        }
-    }
-    matched.pairs.sort_by(|a, b| natural_order(&a.pair, &b.pair));
-    matched
 }

@@ -12,6 +12,7 @@ mod halves;
 #[cfg(test)]
 mod layouts;
 mod listing;
+mod matched;
 mod matching;
 mod names;
 mod pairing;

@@ -11,7 +11,8 @@ use std::collections::BTreeMap;
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::listing::{Aside, Folder};
-use super::matching::{self, Matched, by_key};
+use super::matched::Matched;
+use super::matching::{self, by_key};
 use super::names::{Open, Reach, SEPARATORS, natural_order, stem, tokens};
 use super::{PairBy, PairFiles};
 use crate::imaging::{Result, Side};

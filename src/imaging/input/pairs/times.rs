@@ -7,7 +7,7 @@
 
 use camino::Utf8PathBuf;
 
-use super::matching::{Matched, finished};
+use super::matched::{Matched, finished};
 use super::names::{numbers, stem};
 use super::{PairBy, PairFiles};
 
