@@ -30,15 +30,22 @@ fn table<'a>(path: &'a Utf8Path, set: &Dataset) -> files::Result<Table<'a>> {
     if grid.rows.first().is_none_or(has_own) {
         return Table::read(path, WHAT, HINT);
     }
-    let header::Headed { names, rows } = header::split(&grid, &header::is_number)?;
+    let is_group = |cell: &str| set.groups.iter().any(|group| group.name == cell);
+    let is_data = |(_, row): &(u64, Fields)| row.iter().filter(|cell| is_group(cell.trim())).count() > 1;
+    let first = grid.rows.iter().position(is_data).unwrap_or(grid.rows.len());
+    let (above, rows) = grid.rows.split_at(first);
+    let width = rows.first().map_or(0, |(_, row)| row.len());
+    if let Some((line, row)) = rows.iter().find(|(_, row)| row.len() != width) {
+        return Err(grid.refuse(*line, format!("{} cells, but the first row has {width}", row.len()), None));
+    }
+    let names: Option<Vec<&str>> =
+        above.last().filter(|(_, row)| row.len() == width).map(|(_, row)| row.iter().collect());
     let line = grid.rows[0].0;
     let all = |column: usize, is: &dyn Fn(&str) -> bool| rows.iter().all(|(_, row)| is(row[column].trim()));
-    let width = rows.first().map_or(0, |(_, row)| row.len());
-    let is_group = |cell: &str| set.groups.iter().any(|group| group.name == cell);
     let groups: Vec<usize> = (0..width).filter(|&column| all(column, &is_group)).collect();
     let numbers: Vec<usize> =
         (0..width).filter(|column| !groups.contains(column) && all(*column, &header::is_number)).collect();
-    let name = |column: usize| names.as_ref().map(|names| Name::of(&names[column]));
+    let name = |column: usize| names.as_ref().map(|names| Name::of(names[column]));
     let is_distance = |column: &usize| name(*column).is_some_and(|name| name.what == What::Distance);
     let distance = numbers.iter().copied().find(is_distance).or(match numbers[..] {
         [only] => Some(only),
@@ -48,6 +55,11 @@ fn table<'a>(path: &'a Utf8Path, set: &Dataset) -> files::Result<Table<'a>> {
         let message = "it is not told which two columns name groups of the measurements, and which is their distance";
         return Err(grid.refuse(line, message.to_owned(), Some(HINT)));
     };
+    let is_lost = |(_, row): &&(u64, Fields)| row.len() == width && header::is_number(row[distance].trim());
+    if let Some((line, _)) = above.iter().find(is_lost) {
+        let message = "this row does not name two groups of the measurements".to_owned();
+        return Err(grid.refuse(*line, message, Some(HINT)));
+    }
     let sigma = names.as_ref().and_then(|names| names.iter().position(|name| name.eq_ignore_ascii_case("sigma_mm")));
     let unit = name(distance).and_then(|name| name.unit).unwrap_or(Unit::Mm);
     let row = |(line, row): &(u64, Fields)| {
@@ -118,6 +130,8 @@ mod tests {
             ("from,to,distance\ns1,s99,3\n", "not told which two columns"),
             ("from,to,first,second\ns1,s5,3,4\n", "not told which two columns"),
             ("from,to,distance\ns1,s1,3\n", "two different groups"),
+            ("s1,s99,3\ns1,s2,5\n", "csv:1"),
+            ("from,to,distance\ns1,s99,3\ns1,s2,5\n", "does not name two groups"),
         ] {
             let said = read(text).unwrap_err();
             assert!(said.contains(says), "{text}{said}");
