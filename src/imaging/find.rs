@@ -46,8 +46,7 @@ pub struct Wanted<'a> {
 ///
 /// An error where fewer than needed show the board.
 pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
-    let left_out = pairing.left_out();
-    let mut notes: Vec<String> = left_out.iter().cloned().collect();
+    let mut notes: Vec<String> = pairing.left_out().into_iter().collect();
     let headers: Vec<[Announced; 2]> =
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     of_pages(&pairing.pairs, &headers).iter().for_each(progress::note);
@@ -84,7 +83,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
     printed(&wanted.board, &seen).iter().for_each(progress::note);
     let Sorted { found, skipped, blind, open } = sort_out(&pairing.pairs, seen, board);
     if found.len() < wanted.needed {
-        left_out.iter().for_each(progress::note);
+        notes.iter().for_each(progress::note);
         return Err(too_few(found.len(), (skipped, total), other));
     }
     let pairs = number_alike(found, board);

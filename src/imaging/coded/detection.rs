@@ -7,7 +7,7 @@
 //! are printed white on black, is what is seen. Goes wrong: no marker that can be read; another board, which is named
 //! where the markers tell (`explain`).
 
-use super::claim::{self, Claim};
+use self::claim::Claim;
 use super::copies::{ENOUGH_MARGIN_PX, grids_on, levels, without_strays};
 use super::in_grid::{faint_in, markers_in};
 use super::marker::{Fields, fields};
@@ -20,6 +20,8 @@ use crate::imaging::detect::{Detected, Refusal, on_a_copy};
 use crate::imaging::image::pyramid::Level;
 use crate::imaging::image::{Grey8, Picture};
 use crate::imaging::lattice::{Lattice, Places};
+
+mod claim;
 
 /// Grids that are looked at on a copy, the largest first.
 const MOST_GRIDS: usize = 12;

@@ -1,6 +1,5 @@
 //! Boards whose markers number their corners: found in any part of them.
 
-mod claim;
 mod copies;
 mod detection;
 mod explain;
@@ -12,7 +11,6 @@ pub mod marker;
 pub mod measures;
 mod numbering;
 mod other_kind;
-mod quads;
 mod separate;
 #[cfg(test)]
 mod tests;

@@ -11,12 +11,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point2};
 
+use self::quads::{Quad, quads};
 use super::copies::{ENOUGH_MARGIN_PX, levels, without_strays};
 use super::detection;
 use super::explain;
 use super::marker::{Fields, Marker, fields, grey_at, mapped, read, square_map};
 use super::numbering::{AGREEING, tolerated};
-use super::quads::{Quad, quads};
 use crate::imaging::Board;
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Kind, Layout, Print, Squares};
@@ -355,6 +355,7 @@ fn unlike(board: &Board, tags: &[Tag], others: impl Iterator<Item = Order>) -> S
 }
 
 mod family;
+mod quads;
 #[cfg(test)]
 mod tests;
 

@@ -8,7 +8,7 @@ use nalgebra::Point2;
 
 use super::super::copies::levels;
 use super::super::marker::{Fields, Marker, TAG_BORDERS, mapped, read, square_map};
-use super::super::quads::{Quad, quads};
+use super::quads::{Quad, quads};
 use crate::imaging::board::dictionary::Dictionary;
 use crate::imaging::board::{Board, Kind};
 use crate::imaging::detect::Refusal;

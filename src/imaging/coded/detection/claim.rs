@@ -10,8 +10,8 @@
 
 use nalgebra::{Matrix3, Point2};
 
-use super::local_map::least_squares;
-use super::marker::mapped;
+use super::super::local_map::least_squares;
+use super::super::marker::mapped;
 use crate::imaging::Board;
 use crate::imaging::board::Pitch;
 use crate::imaging::lattice::Places;
