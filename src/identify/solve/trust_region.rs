@@ -46,17 +46,21 @@ pub fn solve(problem: &dyn Problem, start: &[f64], settings: &DescentSettings) -
             run.stop = Stop::SmallGradient;
             break;
         }
-        let stop = local.step(&mut x, &mut radius, &mut run.evaluations, settings);
-        (residuals, jacobian) = problem.linearised(&x);
-        run.evaluations += 1 + n;
-        cost = 0.5 * residuals.norm_squared();
-        for (s, norm) in scale.iter_mut().zip(column_norms(&jacobian)) {
-            *s = s.max(norm);
+        let stop;
+        (cost, stop) = local.step(&mut x, &mut radius, &mut run.evaluations, settings);
+        run.stop = stop.unwrap_or(Stop::IterationLimit);
+        let goes_on = stop.is_none() && run.iterations < settings.iterations;
+        if goes_on {
+            (residuals, jacobian) = problem.linearised(&x);
+            run.evaluations += 1 + n;
+            cost = 0.5 * residuals.norm_squared();
+            for (s, norm) in scale.iter_mut().zip(column_norms(&jacobian)) {
+                *s = s.max(norm);
+            }
         }
         run.history.push(cost);
         run.history_evaluations.push(run.evaluations);
-        if let Some(stop) = stop {
-            run.stop = stop;
+        if !goes_on {
             break;
         }
     }
@@ -76,15 +80,15 @@ struct Local<'a> {
 }
 
 impl Local<'_> {
-    /// Takes the first step that lowers the cost as predicted, from ever smaller radii; why the search ends there,
-    /// where it does.
+    /// Takes the first step that lowers the cost as predicted, from ever smaller radii; the cost there, and why the
+    /// search ends there, where it does.
     fn step(
         &self,
         x: &mut Vec<f64>,
         radius: &mut f64,
         evaluations: &mut usize,
         settings: &DescentSettings,
-    ) -> Option<Stop> {
+    ) -> (f64, Option<Stop>) {
         let Local { problem, residuals, jacobian, scale, cost, .. } = *self;
         let (lower, upper) = (problem.lower(), problem.upper());
         loop {
@@ -107,14 +111,14 @@ impl Local<'_> {
             if ratio >= ACCEPT && actual > 0.0 {
                 *x = candidate;
                 let ends = actual <= settings.reduction * cost && predicted <= settings.reduction * cost;
-                return ends.then_some(Stop::SmallReduction);
+                return (new_cost, ends.then_some(Stop::SmallReduction));
             }
             // A step cut at a wall may predict a rise; that asks for a smaller radius, not for the end.
             if predicted >= 0.0 && predicted <= settings.reduction * cost {
-                return Some(Stop::SmallReduction);
+                return (cost, Some(Stop::SmallReduction));
             }
             if *radius <= settings.step * scaled_norm(x, scale).max(1e-3) {
-                return Some(Stop::SmallStep);
+                return (cost, Some(Stop::SmallStep));
             }
         }
     }
