@@ -56,6 +56,7 @@ pub mod cli;
 pub mod commands;
 #[doc(hidden)]
 pub mod config;
+mod crossing;
 #[doc(hidden)]
 pub mod csv_table;
 #[doc(hidden)]

@@ -7,6 +7,7 @@
 
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
+use crate::crossing::crossing;
 use crate::identify::residuals::rows::Rows;
 use crate::identify::sensor::{EVIDENCE, Raw, Scatter};
 use crate::statistics::median;
@@ -16,8 +17,12 @@ use crate::statistics::median;
 pub(super) const LEAST_MM: f64 = 1e-5;
 const LEAST_RAD: f64 = 1e-7;
 
-/// Largest scatter, mm.
+/// Largest scatter, mm, and largest scale.
 const LARGEST_MM: f64 = 1e5;
+const LARGEST_SCALE: f64 = 1e12;
+
+/// Scatters and scales that differ by this share are one.
+const SAME: f64 = 1e-12;
 
 /// Factors of the stated covariances that are tried.
 const STATED: [f64; 10] = [1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 3.0, 10.0, 30.0, 100.0];
@@ -28,9 +33,6 @@ const OVERSTATED: f64 = 0.4;
 
 /// How many standard deviations below nothing a variance is taken to be at the most.
 const FARTHEST: f64 = -6.0;
-
-/// Halvings of the range of scatters, in its logarithm.
-const HALVINGS: usize = 40;
 
 /// One number of a residual, along an axis of its covariance.
 #[derive(Debug, Clone, Copy, Default)]
@@ -100,9 +102,15 @@ impl Residual {
 /// White size of each row's residual in so many standard deviations, brought to the size of one normal number; zero for
 /// rows without one.
 pub(super) fn sizes(residuals: &[Residual], scatter: &Scatter, scale: f64, count: usize) -> Vec<f64> {
+    let white: Vec<f64> = residuals.iter().map(|residual| residual.white_square(scatter)).collect();
+    sizes_of(residuals, &white, scale, count)
+}
+
+/// The same of white squares that are known.
+fn sizes_of(residuals: &[Residual], white: &[f64], scale: f64, count: usize) -> Vec<f64> {
     let mut squares = vec![0.0; count];
-    for residual in residuals {
-        let white = residual.white_square(scatter) / (scale * scale);
+    for (residual, white) in residuals.iter().zip(white) {
+        let white = white / (scale * scale);
         let square = if residual.count == 1 { white } else { as_one_number(white) };
         squares[residual.row] = f64::max(squares[residual.row], square);
     }
@@ -129,13 +137,14 @@ pub(super) fn robust_scale(
 ) -> f64 {
     // Of data without noise rounding is left, which is no scale for what is left after the next step.
     let sds = residuals.iter().flat_map(Residual::numbers).map(|n| n.variance(scatter).sqrt());
-    let (mut low, mut high) = (LEAST_MM / median(sds).unwrap_or(1.0).max(LEAST_MM), 1e12);
-    for _ in 0..2 * HALVINGS {
-        let scale = f64::sqrt(low * high);
-        let above = freedom * median_size(&sizes(residuals, scatter, scale, count), rows) > 1.0;
-        if above { low = scale } else { high = scale }
-    }
-    f64::sqrt(low * high)
+    let (low, high) = (LEAST_MM / median(sds).unwrap_or(1.0).max(LEAST_MM), LARGEST_SCALE);
+    let white: Vec<f64> = residuals.iter().map(|residual| residual.white_square(scatter)).collect();
+    in_logarithms(low, high, |scale| freedom * median_size(&sizes_of(residuals, &white, scale, count), rows))
+}
+
+/// Where a positive function of a positive number falls below one.
+fn in_logarithms(low: f64, high: f64, of: impl Fn(f64) -> f64) -> f64 {
+    crossing(low.ln(), high.ln(), SAME, |x| of(x.exp()).ln()).exp()
 }
 
 /// Robust standard deviation of the sizes of these rows: their median over that of a normal number's absolute value.
@@ -153,8 +162,7 @@ pub(super) fn robust_scatter(
     before: Scatter,
     both: bool,
 ) -> Scatter {
-    let excess =
-        |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, 1.0, count), rows)).powi(2) - 1.0;
+    let excess = |scatter: &Scatter| (freedom * median_size(&sizes(residuals, scatter, 1.0, count), rows)).powi(2);
     match both {
         true => most_probable(residuals, before, 1.0 / (freedom * freedom), &excess),
         false => with_point(before, &excess),
@@ -188,7 +196,7 @@ pub(super) fn estimate_scatter(
     let wanted = points_left.max(of_points / total);
     let excess = |scatter: &Scatter| {
         let sum: f64 = residuals.iter().map(|r| r.weight * r.weight * r.white_square(scatter)).sum();
-        sum / wanted.max(f64::MIN_POSITIVE) - 1.0
+        sum / wanted.max(f64::MIN_POSITIVE)
     };
     let left = wanted / of_points.max(1.0);
     let scatter = Scatter { rotation_rad, ..most_probable(&residuals, before, left, &excess) };
@@ -221,20 +229,15 @@ fn hidden(residuals: &[Residual], left: f64, scatter: &Scatter) -> (f64, f64) {
     if above.is_finite() { (above.max(0.0), sd) } else { (0.0, 0.0) }
 }
 
-/// The scatter of a coordinate at which nothing is in excess, the factor of the stated covariances held.
+/// The scatter of a coordinate at which the excess is one, the factor of the stated covariances held.
 fn with_point(before: Scatter, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
-    let mut scatter = before;
-    let (mut low, mut high) = (LEAST_MM, LARGEST_MM);
-    for _ in 0..HALVINGS {
-        scatter.point_mm = f64::sqrt(low * high);
-        if excess(&scatter) > 0.0 { low = scatter.point_mm } else { high = scatter.point_mm }
-    }
-    scatter
+    let at = |point_mm: f64| Scatter { point_mm, ..before };
+    at(in_logarithms(LEAST_MM, LARGEST_MM, |point_mm| excess(&at(point_mm))))
 }
 
-/// Of the pairs of factor and scatter that leave nothing in excess the most probable one, where it is clearly more so
-/// than covariances taken at their word, and than these made smaller by what the residuals leave; `left` is the share
-/// of the numbers that the fit left.
+/// Of the pairs of factor and scatter at which the excess, the residuals' squares over what they should be, is one, the
+/// most probable, where it is clearly more so than covariances taken at their word, and than these made smaller by what
+/// the residuals leave; `left` is the share of the numbers that the fit left.
 fn most_probable(residuals: &[Residual], before: Scatter, left: f64, excess: &dyn Fn(&Scatter) -> f64) -> Scatter {
     let at = |stated: f64| Scatter { point_mm: LEAST_MM, stated, ..before };
     if residuals.iter().all(|r| r.numbers().iter().all(|n| n.variance <= 0.0)) {
@@ -246,16 +249,16 @@ fn most_probable(residuals: &[Residual], before: Scatter, left: f64, excess: &dy
         0.5 * left * (numbers().map(|n| n.variance(scatter).ln()).sum::<f64>() + numbers().count() as f64 * excess)
     };
     let word = match excess(&at(1.0)) {
-        above if above > 0.0 => with_point(at(1.0), excess),
-        above if above < OVERSTATED - 1.0 => at((1.0 + above).max(1e-12)),
+        there if there > 1.0 => with_point(at(1.0), excess),
+        there if there < OVERSTATED => at(there.max(1e-12)),
         _ => at(1.0),
     };
-    let tried = STATED.iter().filter(|s| excess(&at(**s)) > 0.0).map(|&s| with_point(at(s), excess));
+    let tried = STATED.iter().filter(|s| excess(&at(**s)) > 1.0).map(|&s| with_point(at(s), excess));
     let best = tried.map(|s| (cost(&s, 0.0), s)).min_by(|a, b| a.0.total_cmp(&b.0));
-    let above = excess(&word).min(0.0);
-    let smaller = Scatter { stated: word.stated * (1.0 + above).max(1e-12), ..word };
+    let there = excess(&word).min(1.0);
+    let smaller = Scatter { stated: word.stated * there.max(1e-12), ..word };
     match best {
-        Some((least, scatter)) if least < cost(&word, above).min(cost(&smaller, 0.0)) - EVIDENCE => scatter,
+        Some((least, scatter)) if least < cost(&word, there - 1.0).min(cost(&smaller, 0.0)) - EVIDENCE => scatter,
         _ => word,
     }
 }
@@ -279,7 +282,7 @@ mod tests {
 
     fn found(residuals: &[Residual]) -> Scatter {
         let wanted = 3.0 * residuals.len() as f64;
-        let excess = |s: &Scatter| residuals.iter().map(|r| r.white_square(s)).sum::<f64>() / wanted - 1.0;
+        let excess = |s: &Scatter| residuals.iter().map(|r| r.white_square(s)).sum::<f64>() / wanted;
         most_probable(residuals, Scatter::of_point(1.0), 1.0, &excess)
     }
 

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix2, Vector2};
 
+use crate::crossing::crossing;
 use crate::statistics::median;
 use crate::stereo::data::{Observation, View, in_use};
 use crate::stereo::solve::Loss;
@@ -25,6 +26,9 @@ const MEDIAN_CHI_SQUARE_2: f64 = 2.0 * std::f64::consts::LN_2;
 
 /// Residuals below this are exact: synthetic corners without noise. It keeps weights finite.
 const FLOOR_PX: f64 = 1e-9;
+
+/// Added variances that differ by this share of the plain scatter are one.
+const SAME: f64 = 1e-10;
 
 impl Noise {
     /// Every corner alike, one px.
@@ -158,30 +162,11 @@ fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -
         let factor = shrunk(&chi_squares(&aligned, 0.0), own, &reduced);
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
-    // With the covariances in, less than the plain scatter is missing: the root lies between zero and it. The inverse
-    // of the reduced chi-square is nearly a straight line in the added variance, which the secant follows; halving
-    // guards it.
-    let (mut low, mut high) = (0.0, plain);
-    let miss = |added: f64| 1.0 / with(added) - 1.0;
-    let (mut at_low, mut at_high) = (own.map_or(-1.0, |own| 1.0 / own - 1.0), miss(plain));
-    for round in 0..60 {
-        if at_high <= 0.0 || high - low <= 1e-9 * high {
-            break;
-        }
-        let secant = low - at_low * (high - low) / (at_high - at_low);
-        let middle = if round % 3 == 2 { 0.5 * (low + high) } else { secant.clamp(low, high) };
-        let at = miss(middle);
-        if at < 0.0 {
-            (low, at_low) = (middle, at)
-        } else {
-            (high, at_high) = (middle, at)
-        }
-        if at == 0.0 || (at.abs() < 1e-9) {
-            high = middle;
-            break;
-        }
-    }
-    Noise { factor: 1.0, added_px: high.sqrt().max(FLOOR_PX), reduced_chi_square: own }
+    // With the covariances in, less than the plain scatter is missing: it lies between zero and that. The inverse of
+    // the reduced chi-square is nearly a straight line in the added variance.
+    let missing = |added: f64| if added > 0.0 || known { 1.0 - 1.0 / with(added) } else { 1.0 };
+    let added = crossing(0.0, plain, SAME * plain, missing);
+    Noise { factor: 1.0, added_px: added.sqrt().max(FLOOR_PX), reduced_chi_square: own }
 }
 
 /// `W` with `W' W = Sigma^-1`, from the Cholesky factor.
