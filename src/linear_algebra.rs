@@ -33,15 +33,27 @@ pub fn pseudo_inverse(matrix: DMatrix<f64>) -> DMatrix<f64> {
     if scaled.iter().any(|v| !v.is_finite()) {
         return DMatrix::zeros(n, n);
     }
-    let eigen = SymmetricEigen::new(scaled);
+    let inverse = inverse_of_full_rank(&scaled).unwrap_or_else(|| inverse_by_axes(scaled));
+    DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
+}
+
+/// The inverse where all eigenvalues are surely above those that count as zero: the sum of those of a matrix is above
+/// its largest one, and that of its inverse above one over its smallest.
+fn inverse_of_full_rank(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let inverse = Cholesky::new(matrix.clone())?.inverse();
+    (inverse.trace() * matrix.trace() * RANK < 1.0).then_some(inverse)
+}
+
+fn inverse_by_axes(matrix: DMatrix<f64>) -> DMatrix<f64> {
+    let mut inverse = DMatrix::zeros(matrix.nrows(), matrix.nrows());
+    let eigen = SymmetricEigen::new(matrix);
     let threshold = RANK * eigen.eigenvalues.amax();
-    let mut inverse = DMatrix::zeros(n, n);
     for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
         if *value > threshold {
             inverse += vector * vector.transpose() / *value;
         }
     }
-    DMatrix::from_fn(n, n, |r, c| inverse[(r, c)] * scale[r] * scale[c])
+    inverse
 }
 
 /// The solution of normal equations that may lack rank; what they do not determine is zero.

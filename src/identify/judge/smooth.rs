@@ -58,10 +58,8 @@ pub fn most_probable(rows: &Rows, offsets: &[f64], sds: &[f64]) -> Option<Detect
     let size_mm = size_mm(rows)?;
     let unit_mm = rows.unit_variance_mm2().sqrt();
     let best = |products: &[Products], ratio: f64| {
-        NOISES
-            .iter()
-            .map(|&noise| (evidence(products, sds, ratio * unit_mm, noise), noise))
-            .max_by(|a, b| a.0.total_cmp(&b.0))
+        let weighed = Weighed::new(products, sds.len() + 1, ratio * unit_mm)?;
+        NOISES.iter().map(|&noise| (weighed.evidence(sds, noise), noise)).max_by(|a, b| a.0.total_cmp(&b.0))
     };
     let problem = Linearised::new(rows, offsets);
     let mut found: Option<(f64, SmoothError)> = None;
@@ -113,36 +111,53 @@ fn products(rows: &Rows, problem: &Linearised, length_mm: f64) -> Vec<Products> 
     rows.blocks.iter().zip(&problem.placements).filter_map(of_block).collect()
 }
 
-/// Logarithm of the data's probability with an error of so many mm a unit of noise, and noise of so many times that of
-/// the rows.
-fn evidence(products: &[Products], sds: &[f64], ratio_mm: f64, noise: f64) -> f64 {
-    let kept = sds.len() + 1;
-    let precision = 1.0 / (noise * noise);
-    let mut normal = DMatrix::zeros(kept, kept);
-    let mut log = 0.0;
-    for block in products {
-        let own = block.normal.nrows() - block.functions;
-        let mut rest = block.normal.view((0, 0), (own, own)).into_owned();
-        if ratio_mm > 0.0 {
-            let at = (own, own);
-            let inner = block.normal.view(at, (block.functions, block.functions)) * (ratio_mm * ratio_mm)
-                + DMatrix::identity(block.functions, block.functions);
-            let Some(inner) = Cholesky::new(inner) else { return f64::NEG_INFINITY };
-            let cross = block.normal.view((own, 0), (block.functions, own)) * ratio_mm;
-            rest -= cross.tr_mul(&inner.solve(&cross));
-            log -= half_log_determinant(&inner);
+/// The products of all placements with an error of one size, its functions and the transforms eliminated.
+struct Weighed {
+    /// Of parameters, extras and residual, at the noise of the rows.
+    normal: DMatrix<f64>,
+    /// Half the logarithm of the determinants of what was eliminated.
+    log_determinant: f64,
+    /// Numbers that are left, less the transforms.
+    numbers: f64,
+}
+
+impl Weighed {
+    /// With an error of so many mm a unit of noise. `kept` columns stay; `None` where the others are not determined.
+    fn new(products: &[Products], kept: usize, ratio_mm: f64) -> Option<Weighed> {
+        let mut all = Weighed { normal: DMatrix::zeros(kept, kept), log_determinant: 0.0, numbers: 0.0 };
+        for block in products {
+            let own = block.normal.nrows() - block.functions;
+            let mut rest = block.normal.view((0, 0), (own, own)).into_owned();
+            if ratio_mm > 0.0 {
+                let at = (own, own);
+                let inner = block.normal.view(at, (block.functions, block.functions)) * (ratio_mm * ratio_mm)
+                    + DMatrix::identity(block.functions, block.functions);
+                let inner = Cholesky::new(inner)?;
+                let cross = block.normal.view((own, 0), (block.functions, own)) * ratio_mm;
+                rest -= cross.tr_mul(&inner.solve(&cross));
+                all.log_determinant += half_log_determinant(&inner);
+            }
+            let frame = own - kept;
+            let inner = Cholesky::new(rest.view((kept, kept), (frame, frame)).into_owned())?;
+            let cross = rest.view((kept, 0), (frame, kept));
+            all.normal += rest.view((0, 0), (kept, kept)) - cross.tr_mul(&inner.solve(&cross));
+            all.log_determinant += half_log_determinant(&inner);
+            all.numbers += block.numbers - frame as f64;
         }
-        let frame = own - kept;
-        let Some(inner) = Cholesky::new(rest.view((kept, kept), (frame, frame)) * precision) else {
-            return f64::NEG_INFINITY;
-        };
-        let cross = rest.view((kept, 0), (frame, kept)) * precision;
-        normal += rest.view((0, 0), (kept, kept)) * precision - cross.tr_mul(&inner.solve(&cross));
-        log -= half_log_determinant(&inner) + block.numbers * noise.ln();
+        Some(all)
     }
-    let last = kept - 1;
-    let gradient = normal.view((0, last), (last, 1)).column(0).into_owned();
-    log - 0.5 * normal[(last, last)] + evidence_of_all(sds, &normal.view((0, 0), (last, last)).into_owned(), &gradient)
+
+    /// Logarithm of the data's probability with noise of so many times that of the rows.
+    fn evidence(&self, sds: &[f64], noise: f64) -> f64 {
+        let normal = &self.normal / (noise * noise);
+        let last = sds.len();
+        let gradient = normal.view((0, last), (last, 1)).column(0).into_owned();
+        let of_parameters = normal.view((0, 0), (last, last)).into_owned();
+        evidence_of_all(sds, &of_parameters, &gradient)
+            - 0.5 * normal[(last, last)]
+            - self.log_determinant
+            - self.numbers * noise.ln()
+    }
 }
 
 fn half_log_determinant(cholesky: &Cholesky<f64, nalgebra::Dyn>) -> f64 {

@@ -142,18 +142,17 @@ impl Rows {
         (self.origins[row] + self.rotations[row] * tool_mm).into()
     }
 
-    /// The frames of the groups of these pairs, by their index.
-    fn frames(&self, pairs: &[Pair], weights: &[f64], tool_mm: &Vector3<f64>) -> Vec<Option<Transform>> {
-        let groups = self.groups.iter().max().map_or(0, |most| most + 1);
-        let frame = |group: usize| {
-            let of_group = || pairs.iter().zip(weights).filter(move |(pair, _)| pair.group == group);
-            (of_group().count() >= 3).then(|| {
-                fitted_frame(
-                    of_group().map(|(pair, w)| (self.target(pair.row, tool_mm), self.points[pair.reading], *w)),
-                )
-            })
-        };
-        (0..groups).map(frame).collect()
+    /// Places among these pairs of those of each group.
+    fn by_group(&self, pairs: &[Pair]) -> Vec<Vec<usize>> {
+        let mut groups = vec![Vec::new(); self.groups.iter().max().map_or(0, |most| most + 1)];
+        pairs.iter().enumerate().for_each(|(k, pair)| groups[pair.group].push(k));
+        groups
+    }
+
+    /// The frame of a group of these pairs.
+    fn frame(&self, group: &[usize], pairs: &[Pair], weights: &[f64], tool_mm: &Vector3<f64>) -> Option<Transform> {
+        let weighed = |&k: &usize| (self.target(pairs[k].row, tool_mm), self.points[pairs[k].reading], weights[k]);
+        (group.len() >= 3).then(|| fitted_frame(group.iter().map(weighed)))
     }
 
     /// The distances of these pairs with frames and tool at the least sum of them.
@@ -164,10 +163,11 @@ impl Rows {
         tool_free: bool,
         rounds: usize,
     ) -> (Vec<Option<f64>>, Vector3<f64>) {
-        let mut weights = vec![1.0; pairs.len()];
+        let (mut weights, groups) = (vec![1.0; pairs.len()], self.by_group(pairs));
         let mut errors = Vec::new();
         for _ in 0..rounds {
-            let frames = self.frames(pairs, &weights, &tool_mm);
+            let frame = |group: &Vec<usize>| self.frame(group, pairs, &weights, &tool_mm);
+            let frames: Vec<Option<Transform>> = groups.iter().map(frame).collect();
             if tool_free {
                 tool_mm = self.tool(pairs, &weights, &frames).unwrap_or(tool_mm);
             }
