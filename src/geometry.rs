@@ -129,16 +129,36 @@ fn sharpened(mut rotation: Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> 
     /// What is farther away is another optimum, rad.
     const NEAR_RAD: f64 = 0.3;
     for _ in 0..4 {
-        // Newton's step of the trace over small turns of the rotation.
-        let turned = matrix * rotation.transpose();
-        let even = 0.5 * (turned + turned.transpose());
-        let step = (Matrix3::identity() * even.trace() - even).try_inverse().map(|inverse| inverse * twist(&turned));
+        let (fall, twist) = trace_near(&rotation, matrix);
+        let step = fall.try_inverse().map(|inverse| inverse * twist);
         match step.filter(|step| (KNOWN_RAD..NEAR_RAD).contains(&step.norm())) {
             Some(step) => rotation = Rotation3::from_scaled_axis(step).into_inner() * rotation,
             None => break,
         }
     }
     rotation
+}
+
+/// [`nearest_rotation`] by way of one that is likely near it. Where the trace is level, M R' is symmetric, and the
+/// other places where it is have two of its eigenvalues turned over. Where it falls in all directions each two of them
+/// have a sum above zero, so that all the other places are worse.
+pub fn nearest_rotation_from(near: &Matrix3<f64>, matrix: &Matrix3<f64>) -> Matrix3<f64> {
+    /// Of the trace's fall over its twist, rad: what is known no better is no optimum.
+    const ENDED_RAD: f64 = 1e-11;
+    let rotation = sharpened(*near, matrix);
+    let (fall, twist) = trace_near(&rotation, matrix);
+    match fall.cholesky() {
+        Some(fall) if fall.solve(&twist).norm() <= ENDED_RAD => rotation,
+        _ => nearest_rotation(matrix),
+    }
+}
+
+/// How the trace of R' M changes with small turns of R, to second order: half a quadratic form by which it falls, and
+/// the turn that it goes up along.
+fn trace_near(rotation: &Matrix3<f64>, matrix: &Matrix3<f64>) -> (Matrix3<f64>, Vector3<f64>) {
+    let turned = matrix * rotation.transpose();
+    let even = 0.5 * (turned + turned.transpose());
+    (Matrix3::identity() * even.trace() - even, twist(&turned))
 }
 
 /// Twice the area of a triangle, positive where its corners turn left with y up, or clockwise as it is seen with y
@@ -182,6 +202,26 @@ mod tests {
             let found = rotation_vector_of_matrix(&Rotation3::from_scaled_axis(turn).into_inner());
             // Entries of the matrix near one are rounded to 1e-16.
             assert!((found - turn).norm() <= 1e-15 * (1.0 + size), "{size}: {found}");
+        }
+    }
+
+    /// From near and from half a turn away; of a cloud, of a plane, mirrored, and of points that are nearly on a line.
+    #[test]
+    fn the_nearest_rotation_is_the_same_from_anywhere() {
+        let rotation = Rotation3::from_scaled_axis(Vector3::new(0.4, -1.1, 0.7)).into_inner();
+        for sizes in [[900.0, 500.0, 200.0], [900.0, 500.0, 0.0], [900.0, 500.0, -200.0], [900.0, 1e-3, 1e-4]] {
+            let odd = 1e-4 * Matrix3::new(1.0, 0.3, -0.7, 0.2, -0.4, 0.9, 0.6, -0.1, 0.5);
+            let matrix = rotation * (Matrix3::from_diagonal(&Vector3::from(sizes)) + odd);
+            let best = nearest_rotation(&matrix);
+            for away_rad in [0.0, 0.01, 0.2, 1.0, std::f64::consts::PI] {
+                for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                    let near = Rotation3::from_scaled_axis(away_rad * axis).into_inner() * rotation;
+                    let found = nearest_rotation_from(&near, &matrix);
+                    assert!((found - best).amax() < 1e-9, "{sizes:?} from {away_rad}: {found} {best}");
+                    let trace = |r: &Matrix3<f64>| (r.transpose() * matrix).trace();
+                    assert!(trace(&found) >= trace(&best) - 1e-9, "{sizes:?} from {away_rad}");
+                }
+            }
         }
     }
 }

@@ -6,7 +6,7 @@
 //! derivatives. Poses lie side by side in arrays, which the compiler works on together (see `crate::widest`); what is
 //! not inlined there would be slower.
 
-use nalgebra::{Matrix3, Point3, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 use super::jacobian::{Stance, Turn};
 
@@ -34,6 +34,12 @@ impl Turns {
     #[inline(always)]
     pub fn of_one(turn: Turn) -> Turns {
         Turns { rad: [turn.rad; LANES], sine: [turn.sine; LANES], cosine: [turn.cosine; LANES] }
+    }
+
+    /// Their sines and cosines.
+    #[inline(always)]
+    pub fn both(&self) -> [Lane; 2] {
+        [self.sine, self.cosine]
     }
 
     /// Sine and cosine of other turns, rad (see [`Turn::sin_cos`]).
@@ -102,9 +108,9 @@ impl Frames {
         }
     }
 
-    /// Takes the rotation and the target's point at each of the poses, with the target at `tool_mm` in the frame, mm.
+    /// The target's point at each of the poses, with the target at `tool_mm` in the frame, mm, axis by axis.
     #[inline(always)]
-    pub fn ends(&self, tool_mm: &Vector3<f64>) -> impl Fn(usize) -> (Matrix3<f64>, Point3<f64>) {
+    pub fn target_mm(&self, tool_mm: &Vector3<f64>) -> [Lane; 3] {
         let [x, y, z] = &self.columns;
         let mut target_mm = self.origin_mm;
         for (i, target) in target_mm.iter_mut().enumerate() {
@@ -112,14 +118,13 @@ impl Frames {
                 target[l] += x[i][l] * tool_mm.x + y[i][l] * tool_mm.y + z[i][l] * tool_mm.z;
             }
         }
-        let [tx, ty, tz] = target_mm;
-        #[inline(always)]
-        move |pose: usize| {
-            let rotation = Matrix3::new(
-                x[0][pose], y[0][pose], z[0][pose], x[1][pose], y[1][pose], z[1][pose], x[2][pose], y[2][pose],
-                z[2][pose],
-            );
-            (rotation, Point3::new(tx[pose], ty[pose], tz[pose]))
-        }
+        target_mm
+    }
+
+    /// The rotation at one of the poses.
+    #[inline(always)]
+    pub fn rotation(&self, pose: usize) -> Matrix3<f64> {
+        let [x, y, z] = &self.columns;
+        Matrix3::from_fn(|i, j| [x[i][pose], y[i][pose], z[i][pose]][j])
     }
 }

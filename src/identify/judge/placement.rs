@@ -10,6 +10,8 @@
 //! calibration's) were found beside the robot, and the placements are fitted to readings that still have them. Goes
 //! wrong: errors that the rows share and nobody stated are in none of it.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6, Point3, Vector3};
 
 use crate::geometry::{Transform, rigid_columns, rotation_matrix, transform_from_matrix};
@@ -84,7 +86,7 @@ pub struct Placed {
     pub fresh_mm2: f64,
     /// How large readings are off.
     scatter: Scatter,
-    kinematics: Kinematics,
+    kinematics: Arc<Kinematics>,
     /// The robot that was found.
     pub robot: Robot,
     offsets: Vec<f64>,

@@ -117,11 +117,16 @@ impl Kinematics {
         Kinematics { nominal: nominal.clone(), parameters: parameters.to_vec(), acts, lanes }
     }
 
+    /// Whether weights bend it: then the chain that their levers are on matters.
+    pub fn has_levers(&self) -> bool {
+        let of_weight = |p: &Parameter| matches!(p, Parameter::Gravity(..) | Parameter::Bending(..));
+        let own = &self.nominal.corrections;
+        !own.gravity.is_empty() || !own.bending.is_empty() || self.parameters.iter().any(of_weight)
+    }
+
     /// Every pose, with derivatives where asked.
     pub fn places(&self, offsets: &[f64], derivatives: bool) -> Vec<Place> {
-        let robot = self.nominal.shifted(&self.parameters, offsets);
-        let links = robot.joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect();
-        let shifted = Shifted { robot, links, offsets };
+        let shifted = self.shifted(offsets);
         if derivatives {
             let columns = |lanes| self.with_columns(&shifted, lanes);
             return self.lanes.par_iter().with_min_len(SHARED_POSES / LANES).flat_map_iter(columns).collect();
@@ -132,26 +137,51 @@ impl Kinematics {
             || {
                 // A loop, as the iterator's own may not be inlined.
                 for lanes in &self.lanes {
-                    self.ends(&shifted, lanes, &mut places);
+                    let frames = self.frames(&shifted, lanes);
+                    let [x, y, z] = frames.target_mm(&shifted.robot.tool_mm);
+                    for l in 0..lanes.poses {
+                        let (point_columns, rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
+                        let (point_mm, rotation) = (Point3::new(x[l], y[l], z[l]), frames.rotation(l));
+                        places.push(Place { point_mm, rotation, point_columns, rotation_columns });
+                    }
                 }
             },
         );
         places
     }
 
-    /// Several poses without derivatives.
+    /// The target's point at every pose, base frame, mm, axis by axis.
+    pub fn targets_mm(&self, offsets: &[f64]) -> [Vec<f64>; 3] {
+        let shifted = self.shifted(offsets);
+        let mut targets_mm = [(); 3].map(|()| Vec::with_capacity(LANES * self.lanes.len()));
+        widest(
+            #[inline(always)]
+            || {
+                for lanes in &self.lanes {
+                    let of_lanes = self.frames(&shifted, lanes).target_mm(&shifted.robot.tool_mm);
+                    for (targets_mm, of_lanes) in targets_mm.iter_mut().zip(&of_lanes) {
+                        targets_mm.extend_from_slice(&of_lanes[..lanes.poses]);
+                    }
+                }
+            },
+        );
+        targets_mm
+    }
+
+    fn shifted<'a>(&self, offsets: &'a [f64]) -> Shifted<'a> {
+        let robot = self.nominal.shifted(&self.parameters, offsets);
+        let links = robot.joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect();
+        Shifted { robot, links, offsets }
+    }
+
+    /// The ends of the chain at several poses.
     #[inline(always)]
-    fn ends(&self, shifted: &Shifted, lanes: &LaneConstants, places: &mut Vec<Place>) {
+    fn frames(&self, shifted: &Shifted, lanes: &LaneConstants) -> Frames {
         let mut frames = Frames::base();
         for (i, joint) in shifted.robot.joints.iter().enumerate() {
             frames.over(joint.a_mm, &self.stances(shifted, lanes, i));
         }
-        let at = frames.ends(&shifted.robot.tool_mm);
-        for pose in 0..lanes.poses {
-            let (rotation, point_mm) = at(pose);
-            let (point_columns, rotation_columns) = (Matrix3xX::zeros(0), Matrix3xX::zeros(0));
-            places.push(Place { point_mm, rotation, point_columns, rotation_columns });
-        }
+        frames
     }
 
     /// How a joint stands.
@@ -176,8 +206,7 @@ impl Kinematics {
     fn swung(&self, shifted: &Shifted, lanes: &LaneConstants, (i, axis): (usize, usize), rad: f64) -> [Lane; 2] {
         let turn = shifted.links[i][axis];
         let Some(own) = &lanes.joints[i].tilt_rad else {
-            let (sine, cosine) = turn.sin_cos(rad);
-            return [[sine; LANES], [cosine; LANES]];
+            return Turns::of_one(turn).both();
         };
         let mut tilted_rad = [rad; LANES];
         add(&mut tilted_rad, 1.0, &own[axis]);

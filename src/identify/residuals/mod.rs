@@ -1,5 +1,6 @@
 //! Predicted poses of the target to white residuals, with the unknowns of a sensor's placement eliminated.
 
+pub mod cost;
 pub mod distances;
 pub mod eliminate;
 pub mod normal;

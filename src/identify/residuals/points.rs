@@ -16,6 +16,8 @@ use crate::robot::jacobian::RAD_PER_MRAD;
 #[derive(Debug, Clone)]
 pub struct Points {
     pub spots: Vec<Spot>,
+    /// Whether they weigh alike in all directions (see [`weigh_alike`]).
+    pub alike: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
     pub oriented: bool,
@@ -56,15 +58,7 @@ impl Points {
     /// Whether the search for the transform ends where it starts: at the closed form for points that weigh alike in all
     /// directions.
     pub(super) fn start_is_best(&self) -> bool {
-        /// Of the whitener: far above its rounding, far below any difference of weights.
-        const ALIKE: f64 = 1e-12;
-        let Some(first) = self.spots.iter().find(|s| s.weight > 0.0) else { return false };
-        let unit = first.whitener[(0, 0)] / first.weight;
-        let is_alike = |s: &Spot| {
-            let alike = Matrix3::from_diagonal_element(unit * s.weight);
-            (s.whitener - alike).amax() <= ALIKE * unit
-        };
-        !self.oriented && self.field.is_none() && self.spots.iter().all(is_alike)
+        !self.oriented && self.field.is_none() && self.alike
     }
 
     /// Numbers that were measured with some weight.
@@ -247,6 +241,19 @@ impl Points {
     }
 }
 
+/// Whether each of these weighs as much as its weight in all directions, in one unit for all.
+pub(super) fn weigh_alike(spots: &[Spot]) -> bool {
+    /// Of the whitener: far above its rounding, far below any difference of weights.
+    const ALIKE: f64 = 1e-12;
+    let Some(first) = spots.iter().find(|s| s.weight > 0.0) else { return false };
+    let unit = first.whitener[(0, 0)] / first.weight;
+    let is_alike = |s: &Spot| {
+        let alike = Matrix3::from_diagonal_element(unit * s.weight);
+        (s.whitener - alike).amax() <= ALIKE * unit
+    };
+    spots.iter().all(is_alike)
+}
+
 /// Predicted orientation after the measured one, as a rotation vector in the sensor's frame.
 fn turn(sensor_from_flange: &Matrix3<f64>, flange_from_target: &Matrix3<f64>, measured: &Matrix3<f64>) -> Vector3<f64> {
     rotation_vector_of_matrix(&(sensor_from_flange * flange_from_target * measured.transpose()))
@@ -286,7 +293,7 @@ mod tests {
         };
         let spots: Vec<Spot> = (0..40).map(spot).collect();
         let (flange_from_target, target) = (Matrix3::identity(), Vec::new());
-        let points = Points { spots, flange_from_target, oriented: false, target, field: None };
+        let points = Points { spots, alike: true, flange_from_target, oriented: false, target, field: None };
         (points, (0..40).map(place).collect())
     }
 
@@ -336,6 +343,7 @@ mod tests {
             place.point_mm.x += 0.1 * (1.7 * k as f64).sin();
         }
         let scatter = Scatter::of_point(1.0);
+        points.alike = weigh_alike(&points.spots);
         // The share of the residuals that a small rigid motion could still take away.
         let left = |points: &Points| {
             let state = State { places: places.clone(), extras: &[], scatter: &scatter };
@@ -348,13 +356,17 @@ mod tests {
             share
         };
         assert!(points.start_is_best() && left(&points) < 1e-9, "{}", left(&points));
-        let mut unlike = points.clone();
-        unlike.spots[3].whitener[(2, 2)] *= 1.5;
+        let changed = |change: &dyn Fn(&mut Spot)| {
+            let mut changed = points.clone();
+            change(&mut changed.spots[3]);
+            changed.alike = weigh_alike(&changed.spots);
+            changed
+        };
+        let unlike = changed(&|spot| spot.whitener[(2, 2)] *= 1.5);
         assert!(!unlike.start_is_best() && left(&unlike) > 1e-6);
         let mut oriented = points.clone();
         oriented.oriented = true;
-        let mut outlier = points.clone();
-        outlier.spots[0].weight *= 2.0;
+        let outlier = changed(&|spot| spot.weight *= 2.0);
         assert!([oriented, outlier].iter().all(|p| !p.start_is_best()));
     }
 }

@@ -6,6 +6,7 @@
 //! eliminated.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Point3, Rotation3, RowDVector};
 use rayon::prelude::*;
@@ -13,7 +14,7 @@ use rayon::prelude::*;
 use super::distances::{Distances, Origin};
 use super::eliminate::{Block, Unknowns};
 use super::pairwise::{CHUNK, Pairs};
-use super::points::Points;
+use super::points::{Points, weigh_alike};
 use super::smooth::Field;
 use super::starts::{first_anchor, turn_on_flange};
 use super::state::State;
@@ -47,7 +48,7 @@ pub struct Task<'a> {
 #[derive(Debug, Clone)]
 pub struct Rows {
     /// The robot at the rows' poses.
-    pub kinematics: Kinematics,
+    pub kinematics: Arc<Kinematics>,
     /// Which row of the data set each place is.
     pub rows: Vec<usize>,
     pub blocks: Vec<Block>,
@@ -62,15 +63,31 @@ impl Rows {
     /// `load_chain`; `weights` are roots of the rows' weights, one a row of the data set, or none where all count
     /// fully.
     pub fn new(task: &Task, scatter: Scatter, weights: &[f64], load_chain: &Robot) -> Rows {
-        let Task { set, robot, parameters, rows, .. } = *task;
-        let mut used: Vec<usize> = rows.to_vec();
+        let mut used: Vec<usize> = task.rows.to_vec();
         // A centre is a place that distances need, wherever its row went.
-        used.extend(set.groups.iter().filter_map(|g| g.center).filter(|c| !rows.contains(c)));
+        used.extend(task.set.groups.iter().filter_map(|g| g.center).filter(|c| !task.rows.contains(c)));
         used.sort_unstable();
-        let joints: Vec<&[f64]> = used.iter().map(|&i| set.poses[i].joints_rad.as_slice()).collect();
-        let kinematics = Kinematics::new(robot, load_chain, parameters, &joints);
-        let places = kinematics.places(&vec![0.0; parameters.len()], false);
-        let by_group = (0..set.groups.len()).map(|group| set.of_group(rows, group)).collect();
+        let joints: Vec<&[f64]> = used.iter().map(|&i| task.set.poses[i].joints_rad.as_slice()).collect();
+        let kinematics = Kinematics::new(task.robot, load_chain, task.parameters, &joints);
+        Rows::of_poses(task, scatter, weights, (Arc::new(kinematics), used))
+    }
+
+    /// The same rows of the same task with another scatter and other weights, and levers on another chain.
+    pub fn weighed_anew(&self, task: &Task, scatter: Scatter, weights: &[f64], load_chain: &Robot) -> Rows {
+        match self.kinematics.has_levers() {
+            true => Rows::new(task, scatter, weights, load_chain),
+            false => Rows::of_poses(task, scatter, weights, (self.kinematics.clone(), self.rows.clone())),
+        }
+    }
+
+    fn of_poses(
+        task: &Task,
+        scatter: Scatter,
+        weights: &[f64],
+        (kinematics, used): (Arc<Kinematics>, Vec<usize>),
+    ) -> Rows {
+        let places = kinematics.places(&vec![0.0; task.parameters.len()], false);
+        let by_group = (0..task.set.groups.len()).map(|group| task.set.of_group(task.rows, group)).collect();
         let blocks = Inputs { task, scatter, weights, used: &used, places: &places, by_group }.blocks();
         Rows { kinematics, rows: used, blocks, scatter, extras: task.extras.to_vec() }
     }
@@ -100,7 +117,6 @@ impl Rows {
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         let state = self.state(offsets, derivatives);
         let part = |b: &Block| b.evaluate(&state, derivatives);
-        // Costs alone are asked for by swarms, whose particles share the threads.
         let parts: Vec<(DVector<f64>, DMatrix<f64>)> = match derivatives {
             true => self.blocks.par_iter().map(part).collect(),
             false => self.blocks.iter().map(part).collect(),
@@ -363,7 +379,8 @@ impl Inputs<'_> {
         let axis = |(k, e): (usize, &Extra)| if let Extra::Target(axis) = e { Some((k, *axis)) } else { None };
         let target: Vec<_> = self.task.extras.iter().enumerate().filter_map(axis).filter(|_| turned).collect();
         let block = |spots: Vec<Spot>| {
-            let mut points = Points { spots, flange_from_target, oriented, target: target.clone(), field: None };
+            let (alike, target) = (weigh_alike(&spots), target.clone());
+            let mut points = Points { spots, alike, flange_from_target, oriented, target, field: None };
             points.field = self.scatter.smooth.map(|error| {
                 let spots: Vec<_> = points.spots.iter().map(|s| (s.point_mm, s.whitener)).collect();
                 Box::new(Field::new(&spots, points.rows_a_spot(), error))

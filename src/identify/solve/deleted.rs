@@ -127,7 +127,8 @@ impl Robust<'_> {
         let rows: Vec<usize> = rows.into_iter().collect();
         let mut weights = self.weights.clone();
         others.iter().for_each(|&row| weights[row] = NEGLIGIBLE);
-        let with = Robust { task: Task { rows: &rows, ..self.task }, weights, ..self.clone() };
+        let task = Task { rows: &rows, ..self.task };
+        let with = Robust { task, weights, unweighted: task.rows_at(self.scatter, &self.robot), ..self.clone() };
         let (deleted, _) = with.deleted();
         let far = others.iter().copied().filter(|&r| deleted[r].size() > sigmas);
         let far: BTreeSet<usize> = far.chain(self.far_off_alone(others, sigmas)).collect();

@@ -5,10 +5,12 @@
 //! scaled back to mm^2, so that unweighted data give eq. (12).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use rayon::prelude::*;
 
 use super::linearised::Linearised;
 use super::problem::Problem;
 use crate::identify::model::base::Base;
+use crate::identify::residuals::cost::PointCost;
 use crate::identify::residuals::eliminate::Block;
 use crate::identify::residuals::rows::Rows;
 use crate::linear_algebra::product;
@@ -52,8 +54,9 @@ impl<'a> Fit<'a> {
     pub fn offsets(&self, x: &[f64]) -> Vec<f64> {
         let (of_base, extras) = x.split_at(self.base.rank());
         let mut offsets: Vec<f64> = vec![0.0; self.spread.nrows()];
-        for (k, value) in of_base.iter().enumerate() {
-            for (offset, share) in offsets.iter_mut().zip(self.spread.column(k).iter()) {
+        // The columns as slices, which a swarm's million calls are worth.
+        for (value, column) in of_base.iter().zip(self.spread.as_slice().chunks_exact(offsets.len().max(1))) {
+            for (offset, share) in offsets.iter_mut().zip(column) {
                 *offset += share * value;
             }
         }
@@ -142,6 +145,19 @@ impl Problem for Fit<'_> {
     fn residuals(&self, x: &[f64]) -> DVector<f64> {
         let (residuals, _) = self.rows.evaluate(&self.offsets(x), false);
         self.with_prior(residuals, x)
+    }
+
+    fn costs(&self, xs: &[f64]) -> Vec<f64> {
+        let of_points = PointCost::of_rows(&self.rows);
+        let quickly = |x: &[f64]| {
+            let of_points = of_points.as_ref()?;
+            let target_mm = self.rows.kinematics.targets_mm(&self.offsets(x));
+            let of_rows: f64 = of_points.iter().map(|cost| cost.at(&target_mm)).sum::<Option<f64>>()?;
+            let of_prior = (&self.prior * DVector::from_column_slice(x)).norm_squared();
+            Some(0.5 * self.unit_mm * self.unit_mm * (of_rows + of_prior))
+        };
+        let cost = |x: &[f64]| quickly(x).unwrap_or_else(|| 0.5 * self.residuals(x).norm_squared());
+        xs.par_chunks(self.dimension().max(1)).map(cost).collect()
     }
 
     fn linearised(&self, x: &[f64]) -> (DVector<f64>, DMatrix<f64>) {

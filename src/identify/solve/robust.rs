@@ -61,13 +61,14 @@ impl<'a> Task<'a> {
             scores: Vec::new(),
             scatter,
             base,
+            unweighted: rows,
         };
         let bounded = if loss == Loss::Biweight { BOUNDED_ROUNDS } else { ROBUST_ROUNDS };
         let mut scale = 1.0;
         for round in 0..ROBUST_ROUNDS {
             let residuals = robust.residuals();
             if round <= bounded {
-                let freedom = robust.freedom(&residuals, &rows);
+                let freedom = robust.freedom(&residuals);
                 let both = round > 0 && round % ROUNDS_A_FACTOR == 0;
                 robust.scatter = robust_scatter(&residuals, self.rows, count, freedom, robust.scatter, both);
                 scale = robust_scale(&residuals, self.rows, count, freedom, &robust.scatter);
@@ -79,7 +80,7 @@ impl<'a> Task<'a> {
             }
             robust.step(STEPS_A_ROUND);
             if round == 0 {
-                self.look_again(&rows, &robust.offsets, &mut robust.base, &mut robust.x);
+                self.look_again(&robust.unweighted, &robust.offsets, &mut robust.base, &mut robust.x);
             }
         }
         Ok(robust)
@@ -94,8 +95,10 @@ impl<'a> Task<'a> {
     fn unfitted(&self, hopeless_mm: f64) -> Vec<Residual> {
         let mut weights = vec![1.0; self.set.poses.len()];
         let mut residuals = Vec::new();
+        let scatter = Scatter::of_point(FIRST_SCATTER_MM);
+        let mut rows = self.rows_at(scatter, self.robot);
         for _ in 0..PLACING_ROUNDS {
-            let rows = Rows::new(self, Scatter::of_point(FIRST_SCATTER_MM), &weights, self.robot);
+            rows = rows.weighed_anew(self, scatter, &weights, self.robot);
             residuals = Residual::all(&rows.raw(&vec![0.0; rows.offset_count()]));
             let typical = typical_mm(&residuals);
             if typical > hopeless_mm {
@@ -148,6 +151,8 @@ pub struct Robust<'a> {
     pub offsets: Vec<f64>,
     pub robot: Robot,
     pub scatter: Scatter,
+    /// The task's rows before any weights.
+    pub(super) unweighted: Rows,
 }
 
 /// The prior of robust fits, where its size is not yet known from the data.
@@ -156,7 +161,7 @@ const LOOSE: Tolerance = Tolerance { lengths_mm: 3.0, target_mm: 100.0, gravity_
 impl Robust<'_> {
     /// The rows with their weights.
     fn rows(&self) -> Rows {
-        Rows::new(&self.task, self.scatter, &self.weights, &self.robot)
+        self.unweighted.weighed_anew(&self.task, self.scatter, &self.weights, &self.robot)
     }
 
     fn residuals(&self) -> Vec<Residual> {
@@ -198,9 +203,9 @@ impl Robust<'_> {
     }
 
     /// What residuals that were fitted have lost: root of numbers over degrees of freedom.
-    fn freedom(&self, residuals: &[Residual], rows: &Rows) -> f64 {
+    fn freedom(&self, residuals: &[Residual]) -> f64 {
         let numbers: usize = residuals.iter().map(|r| r.count).sum();
-        let left = rows.count().saturating_sub(self.x.len()).max(numbers.div_ceil(LEAST_FREEDOM));
+        let left = self.unweighted.count().saturating_sub(self.x.len()).max(numbers.div_ceil(LEAST_FREEDOM));
         (numbers as f64 / left.max(1) as f64).sqrt()
     }
 
