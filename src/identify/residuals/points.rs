@@ -16,7 +16,7 @@ use crate::robot::jacobian::RAD_PER_MRAD;
 #[derive(Debug, Clone)]
 pub struct Points {
     pub spots: Vec<Spot>,
-    /// Whether they weigh alike in all directions (see [`weigh_alike`]).
+    /// Whether they weigh alike in all directions (see `weigh_alike`).
     pub alike: bool,
     /// The target's orientation on the flange before the extra unknowns turn it.
     pub flange_from_target: Matrix3<f64>,
