@@ -52,6 +52,9 @@ struct Sums {
 impl PointCost {
     /// Of each placement; `None` where there are other readings than points of the mark point, or other unknowns.
     pub fn of_rows(rows: &Rows) -> Option<Vec<PointCost>> {
+        if !rows.extras.is_empty() {
+            return None;
+        }
         let of_mark = |points: &Points| points.spots.iter().all(|spot| spot.on_body_mm.is_none());
         let form = |block: &Block| match block {
             Block::Points(points) if !points.oriented && points.field.is_none() && of_mark(points) => {
@@ -64,7 +67,7 @@ impl PointCost {
         for cost in &mut costs {
             cost.nominal = nearest_rotation(&cost.products(&cost.of_poses(&target_mm)).1);
         }
-        rows.extras.is_empty().then_some(costs)
+        Some(costs)
     }
 
     /// `None` where nothing weighs anything.

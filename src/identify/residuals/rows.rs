@@ -117,6 +117,7 @@ impl Rows {
     pub fn evaluate(&self, offsets: &[f64], derivatives: bool) -> (DVector<f64>, DMatrix<f64>) {
         let state = self.state(offsets, derivatives);
         let part = |b: &Block| b.evaluate(&state, derivatives);
+        // Residuals alone are asked for by swarms, whose particles share the threads.
         let parts: Vec<(DVector<f64>, DMatrix<f64>)> = match derivatives {
             true => self.blocks.par_iter().map(part).collect(),
             false => self.blocks.iter().map(part).collect(),
