@@ -141,7 +141,7 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
     }
     let mut of_sensors = Pcg64Mcg::seed_from_u64(seed ^ 0x5eed);
     let phases: Vec<f64> = (0..3 * plan.groups).map(|_| std::f64::consts::TAU * of_sensors.random::<f64>()).collect();
-    let home: Vec<f64> = truth.joints.iter().map(|j| 0.4 * drawn(j, &mut random)).collect();
+    let home: Vec<f64> = truth.joints.iter().map(|j| 0.4 * drawn(j, &mut of_sensors)).collect();
     let axes = home.len();
     let pose = |i: usize, random: &mut Pcg64Mcg| -> Vec<f64> {
         let mut joints: Vec<f64> = truth.joints.iter().map(|j| drawn(j, random)).collect();
@@ -159,16 +159,17 @@ pub fn measured(nominal: &Robot, plan: Plan, seed: u64) -> (Robot, Robot, Vec<Me
         joints
     };
     let readings = |i: usize| if i < plan.samples { plan.readings } else { 1 };
-    let rows = (0..plan.samples + plan.verify)
-        .flat_map(|i| {
-            let joints = pose(i, &mut random);
-            (0..readings(i)).map(|k| (i, k, joints.clone())).collect::<Vec<_>>()
-        })
-        .collect::<Vec<_>>();
-    let rows = rows
-        .into_iter()
-        .map(|(i, k, joints)| {
+    let mut drawn_rows = Vec::new();
+    for i in 0..plan.samples + plan.verify {
+        let joints = pose(i, &mut random);
+        for k in 0..readings(i) {
             let noise = Vector3::from_fn(|_, _| plan.noise_mm * normal(&mut random));
+            drawn_rows.push((i, k, joints.clone(), noise));
+        }
+    }
+    let rows = drawn_rows
+        .into_iter()
+        .map(|(i, k, joints, noise)| {
             let group = i % plan.groups;
             let seen: Point3<f64> = sensor(group) * truth.target_mm(&joints);
             let common = match plan.beyond {
