@@ -65,16 +65,35 @@ impl Turn {
         (rad - self.rad).abs() <= 0.1
     }
 
-    /// Sine and cosine of a turn that is near: of the difference by their series, which end below the last digit.
+    /// Sine and cosine of a turn that is near.
     #[inline(always)]
     pub(super) fn near(&self, rad: f64) -> (f64, f64) {
-        let by = rad - self.rad;
+        self.further(Small::new(rad - self.rad))
+    }
+
+    /// Sine and cosine of the turn that is so much further.
+    #[inline(always)]
+    pub(super) fn further(&self, Small { sine, fall }: Small) -> (f64, f64) {
+        (self.sine + (self.cosine * sine - self.sine * fall), self.cosine - (self.sine * sine + self.cosine * fall))
+    }
+}
+
+/// The sine of a turn of up to a tenth, and what its cosine is below one.
+#[derive(Debug, Clone, Copy)]
+pub struct Small {
+    sine: f64,
+    fall: f64,
+}
+
+impl Small {
+    /// Of a turn in rad, by series that end below the last digit.
+    #[inline(always)]
+    pub fn new(by: f64) -> Small {
         // The reciprocals are constants: a division costs as much as ten products.
         let nested = |square: f64, [a, b, c]: [f64; 3]| 1.0 - square * a * (1.0 - square * b * (1.0 - square * c));
         let square = by * by;
         let sine = by * (1.0 - square * (1.0 / 6.0) * nested(square, [1.0 / 20.0, 1.0 / 42.0, 1.0 / 72.0]));
-        let fall = 0.5 * square * nested(square, [1.0 / 12.0, 1.0 / 30.0, 1.0 / 56.0]);
-        (self.sine + (self.cosine * sine - self.sine * fall), self.cosine - (self.sine * sine + self.cosine * fall))
+        Small { sine, fall: 0.5 * square * nested(square, [1.0 / 12.0, 1.0 / 30.0, 1.0 / 56.0]) }
     }
 }
 

@@ -3,12 +3,12 @@
 //!
 //! In: sines and cosines of the joints at eight poses, their ways. Out: the flange's rotation and the target's point at
 //! each, base frame, the same to the bit as [`super::jacobian::Screws`] has them one pose at a time with its
-//! derivatives. Poses lie side by side in arrays, which the compiler works on together (see `crate::widest`); what is
-//! not inlined there would be slower.
+//! derivatives; or that point alone, carried back from the target, which differs by rounding. Poses lie side by side in
+//! arrays, which the compiler works on together (see `crate::widest`); what is not inlined there would be slower.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::jacobian::{Stance, Turn};
+use super::jacobian::{Small, Stance, Turn};
 
 /// Poses that are computed together.
 pub const LANES: usize = 8;
@@ -42,6 +42,17 @@ impl Turns {
         [self.sine, self.cosine]
     }
 
+    /// Sine and cosine of turns that are all so much further.
+    #[inline(always)]
+    pub fn further(&self, by: Small) -> [Lane; 2] {
+        let (mut sine, mut cosine) = ([0.0; LANES], [0.0; LANES]);
+        for l in 0..LANES {
+            let turn = Turn { rad: self.rad[l], sine: self.sine[l], cosine: self.cosine[l] };
+            (sine[l], cosine[l]) = turn.further(by);
+        }
+        [sine, cosine]
+    }
+
     /// Sine and cosine of other turns, rad (see [`Turn::sin_cos`]).
     #[inline(always)]
     pub fn sin_cos(&self, rad: &Lane) -> [Lane; 2] {
@@ -73,6 +84,19 @@ impl Stances {
     pub fn at(&self, pose: usize) -> Stance {
         let [alpha, beta, turn] = [&self.alpha, &self.beta, &self.turn].map(|both| both.map(|lane| lane[pose]));
         Stance { alpha, beta, turn, shift_mm: self.shift_mm[pose] }
+    }
+}
+
+/// Carries points back over a joint of this length, mm: from the joint's frame at each of the poses to the one before
+/// it. Where a target is takes a third of the work so, without the frame that it stands in.
+#[inline(always)]
+pub fn back_over(a_mm: f64, joint: &Stances, points_mm: &mut [Lane; 3]) {
+    let Stances { alpha: [sa, ca], beta: [sb, cb], turn: [st, ct], shift_mm } = joint;
+    let [xs, ys, zs] = points_mm;
+    for l in 0..LANES {
+        let (x, y, z) = (ct[l] * xs[l] - st[l] * ys[l], st[l] * xs[l] + ct[l] * ys[l], zs[l] + shift_mm[l]);
+        let (x, z) = (a_mm + cb[l] * x + sb[l] * z, cb[l] * z - sb[l] * x);
+        (xs[l], ys[l], zs[l]) = (x, ca[l] * y - sa[l] * z, sa[l] * y + ca[l] * z);
     }
 }
 

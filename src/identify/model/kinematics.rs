@@ -8,8 +8,8 @@ use nalgebra::{Matrix3, Matrix3xX, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::robot::bent::Torques;
-use crate::robot::jacobian::{Feature, Screws, Turn, feature};
-use crate::robot::lanes::{Frames, LANES, Lane, Stances, Turns};
+use crate::robot::jacobian::{Feature, Screws, Small, Turn, feature};
+use crate::robot::lanes::{Frames, LANES, Lane, Stances, Turns, back_over};
 use crate::robot::{Joint, Parameter, Robot};
 use crate::widest::widest;
 
@@ -71,10 +71,12 @@ struct JointLanes {
     tilt_rad: Option<[Lane; 2]>,
 }
 
-/// A robot with its offsets; alpha and beta of its joints where nothing tilts them.
+/// A robot with its offsets; alpha and beta of its joints where nothing tilts them, and what turns each of them further
+/// at all poses alike, where that is all.
 struct Shifted<'a> {
     robot: Robot,
     links: Vec<[Turn; 2]>,
+    further: Vec<Option<Small>>,
     offsets: &'a [f64],
 }
 
@@ -150,15 +152,19 @@ impl Kinematics {
         places
     }
 
-    /// The target's point at every pose, base frame, mm, axis by axis.
+    /// The target's point at every pose, base frame, mm, axis by axis: as of [`Kinematics::places`], but for rounding.
     pub fn targets_mm(&self, offsets: &[f64]) -> [Vec<f64>; 3] {
         let shifted = self.shifted(offsets);
+        let (joints, tool_mm) = (&shifted.robot.joints, shifted.robot.tool_mm);
         let mut targets_mm = [(); 3].map(|()| Vec::with_capacity(LANES * self.lanes.len()));
         widest(
             #[inline(always)]
             || {
                 for lanes in &self.lanes {
-                    let of_lanes = self.frames(&shifted, lanes).target_mm(&shifted.robot.tool_mm);
+                    let mut of_lanes = [tool_mm.x, tool_mm.y, tool_mm.z].map(|number| [number; LANES]);
+                    for (i, joint) in joints.iter().enumerate().rev() {
+                        back_over(joint.a_mm, &self.stances(&shifted, lanes, i), &mut of_lanes);
+                    }
                     for (targets_mm, of_lanes) in targets_mm.iter_mut().zip(&of_lanes) {
                         targets_mm.extend_from_slice(&of_lanes[..lanes.poses]);
                     }
@@ -171,7 +177,13 @@ impl Kinematics {
     fn shifted<'a>(&self, offsets: &'a [f64]) -> Shifted<'a> {
         let robot = self.nominal.shifted(&self.parameters, offsets);
         let links = robot.joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect();
-        Shifted { robot, links, offsets }
+        let further = |(i, (to, from)): (usize, (&Joint, &Joint))| {
+            let by = to.theta_rad - from.theta_rad;
+            let alike = !to.slides && by.abs() < 0.1 && !self.acts.iter().any(|(_, act)| *act == Act::Turns(i));
+            alike.then(|| Small::new(by))
+        };
+        let further = robot.joints.iter().zip(&self.nominal.joints).enumerate().map(further).collect();
+        Shifted { robot, links, further, offsets }
     }
 
     /// The ends of the chain at several poses.
@@ -196,7 +208,10 @@ impl Kinematics {
         Stances {
             alpha: self.swung(shifted, lanes, (i, 0), joint.alpha_rad),
             beta: self.swung(shifted, lanes, (i, 1), joint.beta_rad),
-            turn: own.turns.sin_cos(&turn_rad),
+            turn: match shifted.further[i] {
+                Some(by) => own.turns.further(by),
+                None => own.turns.sin_cos(&turn_rad),
+            },
             shift_mm,
         }
     }
@@ -317,6 +332,11 @@ mod tests {
                     assert_eq!(without.len(), joints.len());
                     for (with, without) in with.iter().zip(&without) {
                         assert_eq!((with.point_mm, with.rotation), (without.point_mm, without.rotation));
+                    }
+                    let targets_mm = kinematics.targets_mm(&offsets);
+                    for (k, place) in without.iter().enumerate() {
+                        let target_mm = Point3::from([0, 1, 2].map(|axis| targets_mm[axis][k]));
+                        assert!((target_mm - place.point_mm).norm() < 1e-9, "{target_mm} for {}", place.point_mm);
                     }
                 }
             }
