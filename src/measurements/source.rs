@@ -16,6 +16,7 @@ use super::columns::judge::{self, Basis, Forced, Verdict, Way};
 use super::columns::layout;
 use super::columns::part::{At, Kind, Part};
 use super::columns::pick::{self, Picked, listed};
+use super::columns::two_frames;
 use super::columns::unsettled;
 use super::copies;
 use super::keys;
@@ -210,6 +211,12 @@ impl Source {
         let apart = |ways| if self.columns.is_some() { None } else { apart::clearest(parts, ways, robot) };
         match judge::decide(parts, &candidates, robot, self.forced()) {
             Verdict::Taken(way, basis) => {
+                if let Some([first, second]) = two_frames::of_way(parts, &way, robot) {
+                    return Err(match widened {
+                        true => unsettled::rows_of_pose(parts),
+                        false => pick::asked(parts, &way.picked.joints, [&first, &second], false),
+                    });
+                }
                 apart(vec![way.clone()]).map_or(Ok((way, basis)), |apart| Err(apart.asked(parts)))
             }
             Verdict::WrongUnit { stated, better } => Err(unsettled::wrong_unit(parts, &stated, &better)),

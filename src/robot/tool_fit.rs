@@ -41,6 +41,8 @@ const SETTLED: f64 = 0.01;
 /// What a nominal chain leaves.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolFit {
+    /// Where the points were measured, from the robot's base.
+    pub sensor_from_base: Transform,
     /// The target in the last frame, mm.
     pub tool_mm: Vector3<f64>,
     /// Middle distance of a predicted point from the measured one, mm.
@@ -100,7 +102,7 @@ fn fit(all: &[Row], tool_mm: Vector3<f64>, from: Start) -> Option<ToolFit> {
         best = others.fold(best, |best, other| if left(&other) < left(&best) { other } else { best });
     }
     let left_mm = left(&best);
-    left_mm.is_finite().then_some(ToolFit { tool_mm: best.1, left_mm, spread_mm })
+    left_mm.is_finite().then_some(ToolFit { sensor_from_base: best.0, tool_mm: best.1, left_mm, spread_mm })
 }
 
 /// Where the search for a tool begins.

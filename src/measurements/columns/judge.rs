@@ -14,6 +14,7 @@ use nalgebra::{Point3, Vector3};
 use super::layout::point;
 use super::part::{At, Part};
 use super::pick::{self, Picked};
+use crate::geometry::Transform;
 use crate::robot::tool_fit::{Start, ToolFit, middle_spread};
 use crate::robot::{Joint, Robot};
 use crate::tables::names::{Unit, What};
@@ -91,21 +92,34 @@ impl Way {
         (least > 0.0).then(|| (fit.left_mm / least, fit.left_mm))
     }
 
+    /// How the flange stands in the frame of the first target's points, at some rows.
+    pub(super) fn sensor_from_flange(&self, parts: &[Part], robot: &Robot) -> Option<Vec<(usize, Transform)>> {
+        let rows = some(parts, &self.picked);
+        let (fit, _) = self.fit(parts, robot, &rows, Start::Around)?;
+        let at = |row: usize| {
+            Some((row, fit.sensor_from_base * robot.base_from_flange(&self.joints_at(parts, robot, row)?)))
+        };
+        Some(rows.into_iter().filter_map(at).collect())
+    }
+
+    /// The robot's joints in a row, rad or mm.
+    fn joints_at(&self, parts: &[Part], robot: &Robot, row: usize) -> Option<Vec<f64>> {
+        let reading = |(at, joint): (&At, &Joint)| {
+            let value = parts[at.part].optional(row, at.column).ok().flatten()?;
+            let reading = pick::reading(parts, at, joint, value, self.joints, self.lengths);
+            Some(if joint.slides { reading } else { reading.to_radians() })
+        };
+        self.picked.joints.iter().zip(&robot.joints).map(reading).collect()
+    }
+
     /// The nominal robot with the tool that these rows ask for, and where it has its target with that of its file.
     fn fit(&self, parts: &[Part], robot: &Robot, rows: &[usize], from: Start) -> Option<(ToolFit, Vec<Vector3<f64>>)> {
-        let Way { picked, joints, lengths, .. } = self;
-        let (_, at) = picked.points.first()?;
+        let (_, at) = self.picked.points.first()?;
         let (mut readings, mut points) = (Vec::new(), Vec::<Point3<f64>>::new());
         for &row in rows {
-            let reading = |(at, joint): (&At, &Joint)| {
-                let value = parts[at.part].optional(row, at.column).ok().flatten()?;
-                let reading = pick::reading(parts, at, joint, value, *joints, *lengths);
-                Some(if joint.slides { reading } else { reading.to_radians() })
-            };
-            let angles: Option<Vec<f64>> = picked.joints.iter().zip(&robot.joints).map(reading).collect();
-            if let (Some(angles), Some(point)) = (angles, point(parts, row, at)) {
+            if let (Some(angles), Some(point)) = (self.joints_at(parts, robot, row), point(parts, row, at)) {
                 readings.push(angles);
-                points.push(point.map(|v| lengths.converted(v)));
+                points.push(point.map(|v| self.lengths.converted(v)));
             }
         }
         let fit = robot.fit_tool(&readings, &points, from).filter(|_| readings.len() >= FEWEST)?;

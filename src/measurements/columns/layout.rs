@@ -20,7 +20,7 @@ const MOST_FREE: usize = 60;
 /// apart that are read to half a millimetre do. Points that differ by errors of three normal numbers, one commanded and
 /// one measured, are apart by 1.54 standard deviations in the middle of all rows, and half of them differ from that by
 /// more than 0.46: three tenths of it.
-const RIGID: f64 = 0.05;
+pub(super) const RIGID: f64 = 0.05;
 
 /// Numbers of a transform but for its last row, which says nothing.
 const TRANSFORM: usize = 12;

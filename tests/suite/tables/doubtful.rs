@@ -347,3 +347,44 @@ fn flags_that_settle_which_joints_keep_all_targets() {
     // Names that are not known, and none.
     check(",torso,knee,hip,neck,waist,ankle,,,,,,", |q| q + 1e-3 * (9.0 * q).sin());
 }
+
+/// Where the robot was sent stands beside what a sensor saw that is parallel to the robot: a body's two points would
+/// turn with the flange.
+#[test]
+fn a_point_that_is_another_one_shifted_is_asked_about() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    for (shift, noise) in [([0.0, 0.0, 15.0], 0.1), ([800.0, -300.0, 40.0], 0.0), ([800.0, -300.0, 40.0], 0.5)] {
+        let other = |p: &[f64; 3]| (0..3).map(|i| p[i] + shift[i] + noise * (9.0 * p[i]).sin()).collect::<Vec<f64>>();
+        let both = |q: &[f64], p: &[f64; 3]| [joined(q, p), other(p)].concat();
+        for header in [
+            "",
+            "q1,q2,q3,q4,q5,q6,x1,y1,z1,x2,y2,z2",
+            "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,x1_mm,y1_mm,z1_mm,x2_mm,y2_mm,z2_mm",
+        ] {
+            let file = folder.file("shifted.csv", text(header, &rows, ",", both));
+            refused(
+                &source(&[&file]),
+                &robot,
+                &["two points would do", "`--columns j1,j2,j3,j4,j5,j6,x,y,z` takes the first"],
+            );
+        }
+    }
+    // A body that does not turn carries two points that are one shifted, too.
+    let turned = |q: &[f64]| robot.base_from_flange(&q.iter().map(|q| q.to_radians()).collect::<Vec<_>>()).rotation;
+    let still: Rows = (0..30)
+        .map(|i| {
+            let [a, b] = [1.3, 2.9].map(|k| 35.0 * (k * f64::from(i)).sin());
+            let joints = [20.0, a, b, -a - b, 35.0, 10.0];
+            let radians: Vec<f64> = joints.iter().map(|q| q.to_radians()).collect();
+            (joints.to_vec(), robot.target_mm(&radians).into())
+        })
+        .collect();
+    assert!(still.iter().all(|(q, _)| turned(q).angle_to(&turned(&still[0].0)) < 1e-6));
+    let file = folder.file(
+        "still.csv",
+        text("", &still, ",", |q, p| [joined(q, p), vec![p[0] + 800.0, p[1] - 300.0, p[2] + 40.0]].concat()),
+    );
+    let (_, said) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+    assert!(said[0].contains("2 targets a pose"), "{said:?}");
+}
