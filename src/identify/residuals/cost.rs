@@ -9,7 +9,7 @@
 
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-use super::eliminate::Block;
+use super::eliminate::{Block, COST_GAIN};
 use super::points::Points;
 use super::rows::Rows;
 use crate::geometry::{nearest_rotation, nearest_rotation_from, rotation_matrix, transform};
@@ -19,9 +19,6 @@ use crate::widest::widest;
 
 /// Steps at the most; two or three are usual.
 const STEPS: usize = 10;
-
-/// A step that lowers the sum by this share is the last: what it leaves goes by the square of that.
-const LAST: f64 = 1e-7;
 
 /// Numbers of a symmetric matrix of three rows, and their places.
 const UPPER: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -125,7 +122,7 @@ impl PointCost {
             if cost > last {
                 return None;
             }
-            if gain <= LAST * cost {
+            if gain <= COST_GAIN * cost {
                 return Some(cost - gain);
             }
             last = cost;

@@ -23,6 +23,9 @@ const INNER_STEPS: usize = 50;
 /// The inner problem is solved when its step's predicted gain falls below this fraction of its cost.
 const INNER_GAIN: f64 = 1e-14;
 
+/// The same where the cost alone is asked for, which a step predicts: what it misses goes by the square of that.
+pub(super) const COST_GAIN: f64 = 1e-7;
+
 /// What one block measures.
 #[derive(Debug, Clone)]
 pub enum Block {
@@ -141,16 +144,33 @@ impl Block {
 
     /// The unknowns at their best.
     pub(super) fn best(&self, state: &State) -> Unknowns {
-        let mut at = self.start(state);
-        if self.unknown_count() == 0 || matches!(self, Block::Points(points) if points.start_is_best()) {
-            return at;
+        if self.start_is_best() { self.start(state) } else { self.descended(state, INNER_GAIN).0 }
+    }
+
+    /// The sum of the squares of the white residuals with the unknowns at their best.
+    pub fn cost(&self, state: &State) -> f64 {
+        match self.start_is_best() {
+            true => self.normal(state, &self.start(state)).cost,
+            false => self.descended(state, COST_GAIN).1,
         }
+    }
+
+    fn start_is_best(&self) -> bool {
+        self.unknown_count() == 0 || matches!(self, Block::Points(points) if points.start_is_best())
+    }
+
+    /// The unknowns where a step would lower the sum of squares by no more than this share, and that sum after it.
+    fn descended(&self, state: &State, least_gain: f64) -> (Unknowns, f64) {
+        let mut at = self.start(state);
         let mut normal = self.normal(state, &at);
         for _ in 0..INNER_STEPS {
             let step = -solution(&normal.matrix, &normal.gradient);
             let gain = -normal.gradient.dot(&step);
-            if gain.is_nan() || gain <= INNER_GAIN * normal.cost {
+            if gain.is_nan() {
                 break;
+            }
+            if gain <= least_gain * normal.cost {
+                return (at, normal.cost - gain);
             }
             // Halved until the cost falls; where it does not, the place is as good as it gets.
             let moved = (0..8).find_map(|halvings| {
@@ -161,7 +181,7 @@ impl Block {
             let Some(moved) = moved else { break };
             (at, normal) = moved;
         }
-        at
+        (at, normal.cost)
     }
 
     /// The unknowns at their best, and there white residuals and their derivatives with respect to them.
@@ -218,6 +238,50 @@ impl Unknowns {
                 Unknowns::Sockets(sockets.iter().enumerate().map(|(k, c)| c + three(3 * k)).collect())
             }
             Unknowns::Frame(frame) => Unknowns::Frame(crate::geometry::perturb(frame, step.as_slice())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_pcg::Pcg64Mcg;
+
+    use crate::identify::data::dataset::Dataset;
+    use crate::identify::residuals::rows::Rows;
+    use crate::identify::sensor::Scatter;
+    use crate::identify::settings::{Model, Settings};
+    use crate::identify::solve::task::Task;
+    use crate::identify::synthetic;
+
+    /// Of every kind of reading, near the best robot and far from it.
+    #[test]
+    fn the_cost_is_that_of_the_residuals() {
+        let mut world = synthetic::world(30, 0.05, 3);
+        synthetic::orient(&mut world.rows, &world.truth, 1e-3, &mut Pcg64Mcg::seed_from_u64(5));
+        let (touched, _) = synthetic::touched(0.0, 4);
+        let from_wire = synthetic::to_first(&world, |i, at, from| (at - from).norm() + 0.1 * (7.0 * i as f64).sin());
+        let (points, touches) = (Dataset::new(&world.rows).unwrap(), Dataset::new(&touched.rows).unwrap());
+        let (parameters, settings) = (world.nominal.mdh_parameters(), Settings::default());
+        for (set, model) in [
+            (&points, Model::Pose),
+            (&points, Model::Position),
+            (&points, Model::CenterDistance),
+            (&points, Model::PairwiseDistance),
+            (&from_wire, Model::CenterDistance),
+            (&touches, Model::CenterDistance),
+        ] {
+            let (fitted, extras) = (set.fit_rows(), set.target_unknowns(model == Model::Pose));
+            let plain = Task::plain(set, &world.nominal, &parameters, &fitted, &settings);
+            let scatter = Scatter { rotation_rad: 1e-3, ..Scatter::of_point(0.05) };
+            let rows = Rows::new(&Task { model, extras, ..plain }, scatter, &[], &world.nominal);
+            assert!(!rows.blocks.is_empty());
+            for size in [0.0, 0.1, 3.0] {
+                let offsets: Vec<f64> = (0..rows.offset_count()).map(|k| size * (1.9 * k as f64).cos()).collect();
+                let expected = rows.evaluate(&offsets, false).0.norm_squared();
+                let found = rows.cost(&offsets);
+                assert!((found / expected - 1.0).abs() < 1e-9, "{} {size}: {found} for {expected}", model.name());
+            }
         }
     }
 }

@@ -134,6 +134,12 @@ impl Rows {
         (residuals, jacobian)
     }
 
+    /// The sum of the squares of the white residuals.
+    pub fn cost(&self, offsets: &[f64]) -> f64 {
+        let state = self.state(offsets, false);
+        self.blocks.iter().map(|block| block.cost(&state)).sum()
+    }
+
     /// Residuals before whitening, by row of the data set, with the root of the row's weight.
     pub fn raw(&self, offsets: &[f64]) -> Vec<(usize, f64, Raw)> {
         let state = self.state(offsets, false);

@@ -149,14 +149,17 @@ impl Problem for Fit<'_> {
 
     fn costs(&self, xs: &[f64]) -> Vec<f64> {
         let of_points = PointCost::of_rows(&self.rows);
-        let quickly = |x: &[f64]| {
+        let quickly = |offsets: &[f64]| {
             let of_points = of_points.as_ref()?;
-            let target_mm = self.rows.kinematics.targets_mm(&self.offsets(x));
-            let of_rows: f64 = of_points.iter().map(|cost| cost.at(&target_mm)).sum::<Option<f64>>()?;
-            let of_prior = (&self.prior * DVector::from_column_slice(x)).norm_squared();
-            Some(0.5 * self.unit_mm * self.unit_mm * (of_rows + of_prior))
+            let target_mm = self.rows.kinematics.targets_mm(offsets);
+            of_points.iter().map(|cost| cost.at(&target_mm)).sum::<Option<f64>>()
         };
-        let cost = |x: &[f64]| quickly(x).unwrap_or_else(|| 0.5 * self.residuals(x).norm_squared());
+        let cost = |x: &[f64]| {
+            let offsets = self.offsets(x);
+            let of_rows = quickly(&offsets).unwrap_or_else(|| self.rows.cost(&offsets));
+            let of_prior = (&self.prior * DVector::from_column_slice(x)).norm_squared();
+            0.5 * self.unit_mm * self.unit_mm * (of_rows + of_prior)
+        };
         xs.par_chunks(self.dimension().max(1)).map(cost).collect()
     }
 
