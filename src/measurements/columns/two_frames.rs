@@ -8,7 +8,7 @@
 use nalgebra::Vector3;
 
 use super::judge::Way;
-use super::layout::{RIGID, point};
+use super::layout::{RIGID, are_readings, point};
 use super::part::{At, Part};
 use crate::geometry::Transform;
 use crate::robot::Robot;
@@ -21,7 +21,7 @@ const CLEAR: f64 = 4.0;
 /// The first target and one that is it in another frame.
 pub(in crate::measurements) fn of_way(parts: &[Part], way: &Way, robot: &Robot) -> Option<[[At; 3]; 2]> {
     let [(_, first), others @ ..] = &way.picked.points[..] else { return None };
-    if others.is_empty() {
+    if others.is_empty() || are_readings(parts, &way.picked) {
         return None;
     }
     let sensor_from_flange = way.sensor_from_flange(parts, robot)?;
