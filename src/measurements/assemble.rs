@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use super::blanks;
 use super::columns::judge::{Basis, Way};
 use super::columns::layout::{ONE_POINT, are_readings, is_kept, point};
 use super::columns::part::{At, Kind, Part};
@@ -108,7 +109,7 @@ impl Taken<'_> {
             None => picked.points.iter().map(|(name, at)| (name.as_str(), at.to_vec())).collect(),
         };
         let mut rows = Vec::new();
-        for row in 0..self.count() {
+        for row in (0..self.count()).filter(|row| !self.is_without_numbers(*row)) {
             for (k, (target, columns)) in measured.iter().enumerate() {
                 let repeated = (places && measured.len() > 1).then_some(k + 1);
                 let mut cells = self.named(row, repeated, &own);
@@ -132,6 +133,21 @@ impl Taken<'_> {
         }
         let path = &self.parts[picked.points.first().map_or(picked.joints[0].part, |(_, at)| at[0].part)].grid.path;
         from_table(Table::new(path, header, rows)?)
+    }
+
+    /// Whether a row has neither joints nor anything that was measured: what a logger writes that lost a sample.
+    fn is_without_numbers(&self, row: usize) -> bool {
+        let lost = |at: &At| matches!(self.parts[at.part].optional(row, at.column), Ok(None));
+        self.way.picked.columns().chain(self.way.picked.distance).all(|at| lost(&at))
+    }
+
+    /// The lines of such rows, for a sentence.
+    pub fn without_numbers(&self) -> Option<String> {
+        let part = &self.parts[self.way.picked.joints[0].part];
+        let rows = (0..self.count()).filter(|row| self.is_without_numbers(*row));
+        let lines: Vec<u64> = rows.map(|row| part.rows[row].0).collect();
+        let what = count(lines.len(), "row");
+        (!lines.is_empty()).then(|| format!("{what} without joints and points left out: {}", blanks::listed(&lines)))
     }
 
     fn count(&self) -> usize {

@@ -38,7 +38,7 @@ impl Table<'_> {
     }
 }
 
-fn listed(lines: &[u64]) -> String {
+pub(super) fn listed(lines: &[u64]) -> String {
     let named: Vec<String> = lines.iter().take(NAMED).map(u64::to_string).collect();
     let more = lines.len().saturating_sub(NAMED);
     let (word, rest) = (

@@ -16,6 +16,7 @@ use super::columns::judge::{self, Basis, Forced, Verdict, Way};
 use super::columns::layout;
 use super::columns::part::{At, Kind, Part};
 use super::columns::pick::{self, Picked, listed};
+use super::columns::truth;
 use super::columns::two_frames;
 use super::columns::unsettled;
 use super::copies;
@@ -118,6 +119,7 @@ impl Source {
             let taken = Taken { parts: &set, way: &way, basis, robot, number: several.then_some(number + 1) };
             rows.extend(taken.rows()?);
             said.push(taken.sentence());
+            said.extend(taken.without_numbers());
             said.extend(joined);
             said.extend(set.iter_mut().filter_map(|part| part.below.take()));
             if way.is_computed() {
@@ -185,6 +187,9 @@ impl Source {
     /// The columns and units of a set of files; `widened` says that several rows of one were put side by side.
     fn way(&self, parts: &[Part], robot: &Robot, widened: bool) -> Result<(Way, Basis)> {
         let count = robot.joints.len();
+        if let Some([first, second]) = truth::beside_measured(parts) {
+            return Err(pick::asked(parts, &[], [&first, &second], false));
+        }
         let picked = pick::by_names(parts, count)?;
         pick::check_lengths(parts, &picked, robot)?;
         if let [(_, first), .., (_, second)] = &picked.points[..] {

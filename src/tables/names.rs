@@ -162,7 +162,8 @@ impl Name {
         // `T_x` and `T14` are of a transform, `x_t` of a target.
         let point = matches!(what, What::Coordinate(_) | What::Matrix(..));
         let transform = point && words[0] == "t" && rest.first() == words.first();
-        let measured = match (says(COMMANDED, &rest[usize::from(transform)..]), says(MEASURED, &rest)) {
+        let computed = says(COMMANDED, &rest[usize::from(transform)..]) || point && says("encoder encoders", &rest);
+        let measured = match (computed, says(MEASURED, &rest)) {
             (true, _) => Some(false),
             (false, true) => Some(true),
             _ => None,

@@ -6,6 +6,7 @@ pub(super) mod judge;
 pub(super) mod layout;
 pub(super) mod part;
 pub(super) mod pick;
+pub(super) mod truth;
 pub(super) mod two_frames;
 pub(super) mod unsettled;
 

@@ -89,13 +89,13 @@ fn unit(parts: &[Part], at: &At) -> Option<Unit> {
 }
 
 /// A set of columns that belong together.
-struct Group<'a> {
+pub(super) struct Group<'a> {
     /// That of the first column.
-    name: &'a Name,
-    columns: Vec<(usize, At)>,
+    pub name: &'a Name,
+    pub columns: Vec<(usize, At)>,
 }
 
-fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group<'_>> {
+pub(super) fn groups(parts: &[Part], number: impl Fn(&Name) -> Option<usize>) -> Vec<Group<'_>> {
     let mut list: Vec<Group> = Vec::new();
     for (part, meanings) in parts.iter().enumerate().filter_map(|(i, p)| Some((i, p.meanings.as_ref()?))) {
         for (column, name) in meanings.iter().enumerate() {

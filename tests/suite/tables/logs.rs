@@ -219,3 +219,27 @@ fn figures_below_a_table_are_no_measurements() {
     let named = folder.file("named.csv", plain.replace("P30,", "last,"));
     same(&source(&[&named]).read(&robot).expect("named").0, &rows, "named");
 }
+
+#[test]
+fn a_sample_that_a_logger_lost_is_left_out() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    for (nothing, what) in [("nan", "1 row"), ("", "1 row"), ("NaN", "2 rows")] {
+        let lost = |i: usize| i == 12 || i == 20 && what == "2 rows";
+        let row = |(i, line): (usize, &str)| match lost(i) {
+            true => vec![nothing; 9].join(",") + "\n",
+            false => format!("{line}\n"),
+        };
+        let body: String = text("", &rows, ",", joined).lines().enumerate().map(row).collect();
+        let file = folder.file("lost.csv", format!("J1,J2,J3,J4,J5,J6,X,Y,Z\n{body}"));
+        let (found, said) = source(&[&file]).read(&robot).unwrap_or_else(|e| panic!("{nothing}: {}", report(&e)));
+        let read: Rows = rows.iter().enumerate().filter(|(i, _)| !lost(*i)).map(|(_, row)| row.clone()).collect();
+        same(&found, &read, nothing);
+        let expected = format!("{what} without joints and points left out: line");
+        assert!(nothing.is_empty() || said.iter().any(|said| said.contains(&expected)), "{nothing}: {said:?}");
+    }
+    // A row that has one of both is still one to mend.
+    let body = text("", &rows, ",", joined).replacen(&rows[3].0[0].to_string(), "nan", 1);
+    let file = folder.file("half.csv", format!("J1,J2,J3,J4,J5,J6,X,Y,Z\n{body}"));
+    refused(&source(&[&file]), &robot, &["`J1` has no number"]);
+}

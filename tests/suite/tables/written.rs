@@ -247,3 +247,27 @@ fn a_finger_is_not_the_end_of_an_arm() {
     let read = stereocal(folder.0.path(), &["robot", "import", "arm.urdf", "--out", "arm"]);
     assert!(read.status.code() == Some(2) && stderr(&read).contains("`--tip hand_tcp`"), "{}", stderr(&read));
 }
+
+/// A controller's own point stands beside a reference instrument's.
+#[test]
+fn an_actual_point_beside_a_reference_is_asked_about() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    let both = |q: &[f64], p: &[f64; 3]| [joined(q, p), vec![p[0] + 900.0, p[1] + 2.0 * (p[2]).sin(), p[2]]].concat();
+    let of = |first: &str, second: &str| {
+        let names = |word: &str| ["X", "Y", "Z"].map(|axis| format!("{axis}_{word}")).join(",");
+        folder.file("two.csv", text(&format!("J1,J2,J3,J4,J5,J6,{},{}", names(first), names(second)), &rows, ",", both))
+    };
+    for (first, second) in
+        [("act", "ref"), ("actual", "reference"), ("meas", "gt"), ("ref", "act"), ("truth", "measured")]
+    {
+        let first_taken = "`--columns j1,j2,j3,j4,j5,j6,x,y,z` takes the first";
+        refused(&source(&[&of(first, second)]), &robot, &["two points would do", first_taken]);
+    }
+    for (first, second) in [("laser", "ref"), ("meas", "ref"), ("meas", "cmd"), ("act", "nominal"), ("tracker", "gt")] {
+        let (found, said) = source(&[&of(first, second)]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));
+        same(&found, &rows, &said[0]);
+    }
+    let encoder = of("encoder", "reference");
+    refused(&source(&[&encoder]), &robot, &["where the robot was sent, or computed", "`--columns`"]);
+}
