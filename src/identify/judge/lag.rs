@@ -1,15 +1,17 @@
-//! Whether angles or points were read before the arm stood still.
+//! Whether angles or points were read before the arm stood still, or joints have play.
 //!
 //! In: a fit and its data set, the rows in the order of measurement. Out: by what share of the move before each pose its
-//! angles are behind the arm, or ahead of it. Method: where a joint still moves while it is read, its angle is off by a
-//! share of its last move, and points know the angle of the pose before, which no robot's do. The effect of that angle
-//! is held against what is left (an F test), the effect of the angle itself at its best, so that a scale or a zero of
-//! a joint is none; a robot that the model lacks something of differs between neighbours in the table either way, so
-//! that the pose before must explain more than the one after does. Goes wrong: rows in another order; arms that sag back
-//! through gear play after each move, which is a lag, too.
+//! angles are behind the arm, or ahead of it; or how far a joint stands apart by the side that it comes from. Method:
+//! where a joint still moves while it is read, its angle is off by a share of its last move, and points know the angle of
+//! the pose before, which no robot's do; where its gear has play, by the sign of that move alone. The effect of that
+//! angle, or sign, is held against what is left (an F test), the effect of the angle itself at its best, so that a scale
+//! or a zero of a joint is none; a robot that the model lacks something of differs between neighbours in the table either
+//! way, so that the pose before must explain more than the one after does. Of the two the likelier one is told, both
+//! where neither is 150 times likelier. Goes wrong: rows in another order.
 
 use nalgebra::DMatrix;
 
+use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::judge::pattern::{Explained, explained};
@@ -26,45 +28,91 @@ const BEATS: f64 = 2.0;
 /// Standard deviations from which on a joint is named.
 const NAMED: f64 = 4.0;
 
+/// What a joint is held against: its angle at a neighbour in the table (-1 before, 1 after), or the sign of its way from
+/// there.
+#[derive(Debug, Clone, Copy)]
+enum By {
+    Angle(isize),
+    Side(isize),
+}
+
 /// Angles or points that know of the pose before.
 pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
     let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
-    let explained_by = |to: isize| explained_by(set, formulation, &linear, to);
-    let lag = explained_by(-1)?;
-    let is_told = lag.chance < FALSE_ALARM && lag.share > SHARE;
-    // What the poses after explain is as much as the model lacks.
-    let after = if is_told { explained_by(1).map_or(0.0, |after| after.share) } else { 0.0 };
-    if !is_told || lag.share < BEATS * after {
-        return None;
+    let told = |by: fn(isize) -> By| {
+        let before = explained_by(set, formulation, &linear, by(-1))?;
+        let is_told = before.chance < FALSE_ALARM && before.share > SHARE;
+        // What the poses after explain is as much as the model lacks.
+        let after =
+            if is_told { explained_by(set, formulation, &linear, by(1)).map_or(0.0, |after| after.share) } else { 0.0 };
+        (is_told && before.share >= BEATS * after).then_some(before)
+    };
+    let lag = told(By::Angle).and_then(|lag| Some((of_lag(&lag)?, lag)));
+    let play = told(By::Side).and_then(|play| Some((of_play(set, &play)?, play)));
+    match (lag, play) {
+        (Some((said, lag)), Some((or, play))) => {
+            let numbers: usize = linear.placements.iter().map(|placement| placement.poses.len()).sum();
+            let play_is_likelier = 0.5 * numbers as f64 * ((1.0 - lag.share) / (1.0 - play.share)).ln();
+            match play_is_likelier {
+                more if more > TOLD_APART => Some(finding(&or, &play, APPROACH)),
+                more if more < -TOLD_APART => Some(finding(&said, &lag, WAIT)),
+                _ => Some(finding(&format!("{said}, or {or}"), &lag, &format!("{WAIT}; or {APPROACH}"))),
+            }
+        }
+        (Some((said, lag)), None) => Some(finding(&said, &lag, WAIT)),
+        (None, Some((said, play))) => Some(finding(&said, &play, APPROACH)),
+        (None, None) => None,
     }
-    let named: Vec<(usize, f64)> = lag
-        .factors
-        .iter()
-        .zip(&lag.sds)
-        .enumerate()
-        .filter(|(_, (factor, sd))| factor.abs() > NAMED * *sd)
-        .map(|(joint, (factor, _))| (joint + 1, -100.0 * factor))
-        .collect();
-    let behind = named.iter().filter(|(_, percent)| *percent > 0.0).count();
+}
+
+const WAIT: &str = "wait longer at each pose, or give the angles that were commanded, and identify again";
+const APPROACH: &str = "come to each pose from one side in every joint, as the robot will in use, and identify again";
+
+fn finding(said: &str, of: &Explained, hint: &str) -> Finding {
+    Finding::new(
+        format!("{said}: {:.0} % of the squares that are left follow the move before each pose", 100.0 * of.share),
+        hint,
+    )
+}
+
+/// Joints whose factor is significant, by their numbers from 1.
+fn named(of: &Explained) -> Vec<(usize, f64)> {
+    let all = of.factors.iter().zip(&of.sds).enumerate();
+    all.filter(|(_, (factor, sd))| factor.abs() > NAMED * *sd)
+        .map(|(joint, (factor, _))| (joint + 1, *factor))
+        .collect()
+}
+
+fn of_lag(lag: &Explained) -> Option<String> {
+    let named = named(lag);
+    let behind = named.iter().filter(|(_, factor)| *factor < 0.0).count();
     if named.is_empty() || behind != 0 && behind != named.len() {
         return None;
     }
-    let joints: Vec<String> =
-        named.iter().map(|(joint, percent)| format!("{:.2} % of it in joint {joint}", percent.abs())).collect();
+    let of_joint =
+        |(joint, factor): &(usize, f64)| format!("{:.2} % of its move in joint {joint}", 100.0 * factor.abs());
+    let joints: Vec<String> = named.iter().map(of_joint).collect();
     let what = if behind > 0 { "the angles" } else { "the points" };
-    Some(Finding::new(
-        format!(
-            "{what} seem to have been read before the arm stood still: {:.0} % of the squares that are left follow the move before each pose ({})",
-            100.0 * lag.share,
-            joints.join(", ")
-        ),
-        "wait longer at each pose, or give the angles that were commanded, and identify again",
-    ))
+    Some(format!("{what} seem to have been read before the arm stood still ({})", joints.join(", ")))
 }
 
-/// What the angles at the poses before (`to` -1) or after (1) explain; the factor of a joint is the share of its move
-/// since then, with the other sign.
-fn explained_by(set: &Dataset, formulation: &Formulation, linear: &Linearised, to: isize) -> Option<Explained> {
+fn of_play(set: &Dataset, play: &Explained) -> Option<String> {
+    let of_joint = |(joint, factor): &(usize, f64)| match set.is_sliding(joint - 1) {
+        true => format!("joint {joint} by {:.3} mm", 2.0 * factor.abs()),
+        false => format!("joint {joint} by {:.3} deg", 2.0 * factor.abs().to_degrees()),
+    };
+    let joints: Vec<String> = named(play).iter().map(of_joint).collect();
+    (!joints.is_empty()).then(|| {
+        format!(
+            "joints stand apart by the side that they come from, as with play of their gears ({})",
+            joints.join(", ")
+        )
+    })
+}
+
+/// What angles at a neighbour, or the sides that joints come from, explain; the factor of an angle is the share of its
+/// move since then, with the other sign, that of a side in rad or mm.
+fn explained_by(set: &Dataset, formulation: &Formulation, linear: &Linearised, by: By) -> Option<Explained> {
     let joints = set.joint_count();
     let offsets: Vec<Option<usize>> = (0..joints)
         .map(|joint| {
@@ -72,14 +120,15 @@ fn explained_by(set: &Dataset, formulation: &Formulation, linear: &Linearised, t
             formulation.parameters().iter().position(|parameter| *parameter == own)
         })
         .collect();
-    explained(linear, joints, |placement| columns(set, &formulation.rows, placement, &offsets, to))
+    explained(linear, joints, |placement| columns(set, &formulation.rows, placement, &offsets, by))
 }
 
-/// Of each joint the effect of its angle at the neighbour, then that of its own angle, on the white residuals. Where the
+/// Of each joint the effect of what it is held against, then that of its own angle, on the white residuals. Where the
 /// neighbour is of another placement, or there is none, the joint counts as if it had stood still.
-fn columns(set: &Dataset, rows: &Rows, placement: &Placement, offsets: &[Option<usize>], to: isize) -> DMatrix<f64> {
+fn columns(set: &Dataset, rows: &Rows, placement: &Placement, offsets: &[Option<usize>], by: By) -> DMatrix<f64> {
     let joints = offsets.len();
     let mut columns = DMatrix::zeros(placement.poses.len(), 2 * joints);
+    let (By::Angle(to) | By::Side(to)) = by;
     for (place, at) in placement.by_pose() {
         let row = rows.rows[place];
         let pose = &set.poses[row];
@@ -89,10 +138,16 @@ fn columns(set: &Dataset, rows: &Rows, placement: &Placement, offsets: &[Option<
             let Some(offset) = offset else { continue };
             // Unknowns are in mrad and mm.
             let unit = if set.is_sliding(joint) { 1.0 } else { 1000.0 };
+            let (own, other) = (pose.joints_rad[joint], neighbour.joints_rad[joint]);
+            let against = match by {
+                By::Angle(_) => other,
+                By::Side(_) if own == other => 0.0,
+                By::Side(_) => (own - other).signum(),
+            };
             for number in at.clone() {
                 let effect = unit * placement.linear.jacobian[(number, *offset)];
-                columns[(number, joint)] = effect * neighbour.joints_rad[joint];
-                columns[(number, joints + joint)] = effect * pose.joints_rad[joint];
+                columns[(number, joint)] = effect * against;
+                columns[(number, joints + joint)] = effect * own;
             }
         }
     }
@@ -127,11 +182,11 @@ mod tests {
         for seed in 1..4 {
             assert_eq!(found(seed, 0.0, 0.0, |_| {}), None, "{seed}");
             let said = found(seed, 5e-4, 0.0, |_| {}).unwrap();
-            let (_, shares) = said.rsplit_once('(').unwrap();
+            let (_, shares) = said.split_once('(').unwrap();
+            let (shares, _) = shares.split_once(')').unwrap();
             let named: Vec<(f64, &str)> = shares
-                .trim_end_matches(')')
                 .split(", ")
-                .map(|share| share.split_once(" % of it in joint ").unwrap())
+                .map(|share| share.split_once(" % of its move in joint ").unwrap())
                 .map(|(percent, joint)| (percent.parse().unwrap(), joint))
                 .collect();
             assert!(said.starts_with("the angles") && named.len() == 2, "{said}");
@@ -144,6 +199,29 @@ mod tests {
             );
             let said = found(seed, 0.0, 5e-4, |_| {}).unwrap();
             assert!(said.starts_with("the points"), "{said}");
+        }
+    }
+
+    /// Points of joints that stand apart by the side they come from, by this much, deg; and of which the angles lag.
+    #[test]
+    fn play_of_a_gear_is_told_from_a_lag() {
+        for seed in 1..4 {
+            for (joint, apart_deg) in [(1, 0.02), (2, 0.06), (0, 0.2)] {
+                let spoil = |world: &mut World| {
+                    let read: Vec<f64> = world.rows.iter().map(|row| row.at.joints_deg[joint]).collect();
+                    for (i, row) in world.rows.iter_mut().enumerate().skip(1) {
+                        row.at.joints_deg[joint] += 0.5 * apart_deg * (read[i] - read[i - 1]).signum();
+                    }
+                };
+                let said = found(seed, 0.0, 0.0, spoil).unwrap_or_default();
+                let expected = format!("play of their gears (joint {} by {apart_deg:.2}", joint + 1);
+                assert!(
+                    said.contains(&expected[..expected.len() - 1]) && !said.contains("stood still"),
+                    "{seed}: {said}"
+                );
+            }
+            let said = found(seed, 2e-3, 0.0, |_| {}).unwrap_or_default();
+            assert!(said.contains("stood still") && !said.contains("play"), "{seed}: {said}");
         }
     }
 
