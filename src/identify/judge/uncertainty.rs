@@ -236,15 +236,15 @@ const NARROW_DEG: f64 = 30.0;
 /// Half of a joint's limits where its file has none, deg.
 const HALF_A_TURN_DEG: f64 = 180.0;
 
-/// Joints but the first, which turns the whole arm, that were bent so little that the robot is known there only, with
-/// their `ranges` in deg.
+/// Joints that were bent so little that the robot is known there only, with their `ranges` in deg. The first turns the
+/// whole arm, but where its axis is, seen from the second's, only its turns show.
 fn near_only(nominal: &Robot, ranges: &[[f64; 2]]) -> Vec<String> {
     let of_joint = |(j, (joint, [low, high])): (usize, (&Joint, &[f64; 2]))| {
         let limits = joint
             .limits_rad
             .map_or((-HALF_A_TURN_DEG, HALF_A_TURN_DEG), |(low, high)| (low.to_degrees(), high.to_degrees()));
         let left_out = (low - limits.0).max(limits.1 - high);
-        let is_narrow = j > 0 && !joint.slides && high - low < NARROW_DEG && left_out > high - low;
+        let is_narrow = !joint.slides && high - low < NARROW_DEG && left_out > high - low;
         is_narrow.then(|| format!("j{} {low:.0}..{high:.0} deg", j + 1))
     };
     nominal.joints.iter().zip(ranges).enumerate().filter_map(of_joint).collect()

@@ -67,3 +67,19 @@ fn what_is_promised_says_whether_the_instruments_noise_is_in_it() {
         assert!(!stated || expected.mean_mm < 0.8 * mean_mm, "{mean_mm} mm, {said}");
     }
 }
+
+/// Any joint may be the one that was hardly turned, the first as well: where its axis is, its turns alone show.
+#[test]
+fn a_joint_that_was_hardly_turned_is_named() {
+    let robot = Robot::paper();
+    let wide = vec![[-60.0, 70.0]; 6];
+    assert!(near_only(&robot, &wide).is_empty());
+    for joint in 0..6 {
+        for half_deg in [0.0, 1.0, 5.0, 14.0] {
+            let mut ranges = wide.clone();
+            ranges[joint] = [20.0 - half_deg, 20.0 + half_deg];
+            let named = near_only(&robot, &ranges);
+            assert!(named.len() == 1 && named[0].starts_with(&format!("j{} ", joint + 1)), "{named:?}");
+        }
+    }
+}
