@@ -59,8 +59,9 @@ impl Findings {
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
         let far_beyond_mm = FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
-        let beyond_all =
-            || (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained("the best fit", left_mm));
+        let beyond_all = || {
+            (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm))
+        };
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
         let is_reached = unexplained.is_none();
         let left_out = left_out_of_a_joint(set, found);
@@ -156,7 +157,9 @@ fn of_noise(set: &Dataset, found: &Identification) -> Option<Finding> {
     let may_be = scatter_mm >= conventions::IMPLAUSIBLE_MM && few_left_out(found);
     let formulation = found.formulation().filter(|_| may_be)?;
     let is_explained = SMALL * scatter_mm < spread_mm(set, &found.fitted);
-    (is_explained && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
+    // A joint that turned while its column stood still scatters the points as well.
+    let is_moving = constant_joints(set, &[]).is_empty();
+    (is_explained && is_moving && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
         Finding::new(
             format!("the readings scatter by {scatter_mm:.2} mm a coordinate, whatever the joints are"),
             "if the instrument is better than that, see whether the robot stood still and joints and readings are of one moment",

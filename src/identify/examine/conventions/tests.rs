@@ -22,7 +22,11 @@ fn one_sphere(tilt_deg: f64, seed: u64) -> (World, Vec<Measurement>) {
 fn said(rows: &[Measurement], robot: &Robot) -> Vec<String> {
     let set = Dataset::new(rows).unwrap();
     let Mended { findings, unexplained_mm, .. } = examine(&set, robot, &Settings::default());
-    findings.into_iter().chain(unexplained_mm.map(|mm| unexplained("the best fit", mm))).map(|f| f.finding).collect()
+    findings
+        .into_iter()
+        .chain(unexplained_mm.map(|mm| unexplained(&set, "the best fit", mm)))
+        .map(|f| f.finding)
+        .collect()
 }
 
 fn joints(rows: &[Measurement], change: impl Fn(&mut Vec<f64>)) -> Vec<Measurement> {
