@@ -86,6 +86,47 @@ pub fn constant_joints(set: &Dataset, left_out: &[usize]) -> Vec<String> {
         .collect()
 }
 
+/// The joint that has one angle in a stretch of rows one after the other, in which others move, and other angles
+/// elsewhere, with the first and the last of them; `None` where several have, as where one axis after the other turns.
+pub fn stands_in(set: &Dataset) -> Option<(usize, [usize; 2])> {
+    /// Rows of a stretch, and the part of all rows that it must be.
+    const FEWEST: usize = 8;
+    const PART: usize = 5;
+    let same = |a: usize, b: usize, joint: usize| {
+        (set.poses[a].joints_rad[joint] - set.poses[b].joints_rad[joint]).abs() <= SAME_JOINT
+    };
+    let longest = |joint: usize| {
+        let (mut best, mut from) = ([0, 0], 0);
+        for row in 1..=set.poses.len() {
+            if row == set.poses.len() || !same(row - 1, row, joint) {
+                best = if row - from > best[1] - best[0] { [from, row] } else { best };
+                from = row;
+            }
+        }
+        let [from, to] = best;
+        let others = (0..set.joint_count()).any(|other| way_in(set.poses[from..to].iter(), other) > STILL);
+        let is_long = to - from >= FEWEST.max(set.poses.len() / PART) && to - from < set.poses.len();
+        (is_long && others && way(set, joint) > STILL).then_some((joint, [from, to - 1]))
+    };
+    let mut all = (0..set.joint_count()).filter_map(longest);
+    all.next().filter(|_| all.next().is_none())
+}
+
+/// What is said of joints whose column stands still in all rows or in a stretch of them, where something is wrong:
+/// nothing, or the end of a sentence.
+pub fn stuck(set: &Dataset) -> String {
+    let said = match (&constant_joints(set, &[])[..], stands_in(set)) {
+        ([], None) => return String::new(),
+        ([], Some((joint, [first, last]))) => {
+            let [first, last] = [first, last].map(|row| &set.poses[row].name);
+            format!("joint {} has one angle in rows {first} to {last}", joint + 1)
+        }
+        ([one], _) => format!("joint {one} has one angle in all rows"),
+        (all, _) => format!("joints {} have one angle in all rows", all.join(", ")),
+    };
+    format!("; {said}: if it was turned there, its column is stuck")
+}
+
 /// How far the target is from where it would be if the joint stood still in the middle of these rows, mm a coordinate,
 /// root of the mean square.
 pub fn moves_mm(set: &Dataset, robot: &Robot, rows: &[usize], joint: usize) -> f64 {
@@ -118,5 +159,31 @@ mod tests {
         let set = Dataset::new(&rows).unwrap();
         assert_eq!(repeated(&set), ["a", "a2"]);
         assert_eq!(constant_joints(&set, &[]), ["1"]);
+    }
+
+    #[test]
+    fn a_column_that_stands_still_half_way_is_named() {
+        let world = synthetic::planned(40, 0, 25.0, 0.02, 1, &|_| {});
+        let count = world.rows.len();
+        let said = |joint: usize, from: usize, to: usize| {
+            let mut rows = world.rows.clone();
+            let angle = rows[from].at.joints_deg[joint];
+            rows[from..to].iter_mut().for_each(|row| row.at.joints_deg[joint] = angle);
+            stuck(&Dataset::new(&rows).unwrap())
+        };
+        assert_eq!(said(3, 5, 6), "");
+        for joint in 0..6 {
+            let first = &world.rows[count / 2].at.pose;
+            let expected = format!("; joint {} has one angle in rows {first} to ", joint + 1);
+            assert!(said(joint, count / 2, count).starts_with(&expected), "{}", said(joint, count / 2, count));
+            assert!(said(joint, 0, count).contains("in all rows"));
+        }
+        // One axis after the other.
+        let mut rows = world.rows.clone();
+        for (i, row) in rows.iter_mut().enumerate() {
+            let turns = 6 * i / count;
+            (0..6).filter(|joint| *joint != turns).for_each(|joint| row.at.joints_deg[joint] = 10.0);
+        }
+        assert_eq!(stuck(&Dataset::new(&rows).unwrap()), "");
     }
 }

@@ -56,6 +56,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     if settings.examine && !along.sessions.is_empty() && along.drifting.is_empty() {
         along.instead = robots::tools::of_sessions(&uncut, &set, &robot);
     }
+    // What looks like the step of a joint may be the tool's.
+    let of_step = along.step.as_ref().filter(|_| settings.examine);
+    if let Some(of_tool) = of_step.and_then(|from| robots::tools::of_step(&uncut, from, &robot)) {
+        along.instead = Some(of_tool);
+    }
     // Sessions have placements of their own: a sensor that was moved does no harm there.
     let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
     against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));

@@ -21,7 +21,7 @@ use super::hypothesis::{Hypothesis, hypotheses, still};
 pub use super::misfit::IMPLAUSIBLE_MM;
 use super::misfit::{ALIKE, DOUBTED_MM, EXPLAINS, Look, Misfit, some_rows};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::still::constant_joints;
+use crate::identify::data::still::stuck;
 use crate::identify::examine::{known, sessions};
 use crate::identify::finding::Finding;
 use crate::identify::settings::Settings;
@@ -195,20 +195,13 @@ fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>) ->
     )
 }
 
-/// What is said of errors that no hypothesis explains, of the fit that left them. Joints that have one angle in all
-/// rows are named: a column may stand still where the joint did not.
+/// What is said of errors that no hypothesis explains, of the fit that left them, with a column that stands still.
 pub fn unexplained(set: &Dataset, fit: &str, left_mm: f64) -> Finding {
-    let constant = match &constant_joints(set, &[])[..] {
-        [] => String::new(),
-        [one] => format!("; joint {one} has one angle in all rows: if it was turned, its column is stuck"),
-        all => {
-            format!("; joints {} have one angle in all rows: if one was turned, its column is stuck", all.join(", "))
-        }
-    };
     Finding::new(
         format!(
             "{fit} leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
-             measured, joints and readings do not belong together, or the readings scatter by as much{constant}"
+             measured, joints and readings do not belong together, or the readings scatter by as much{}",
+            stuck(set)
         ),
         "no single change of units, signs or conventions of all rows explains it",
     )

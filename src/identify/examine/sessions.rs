@@ -12,19 +12,19 @@
 //! rows alike. A verify row belongs to the session of the fitted row before it in the file; before all, to the first.
 //! What goes wrong: sessions shorter than [`SHORTEST`] rows, of a socket four touches, are not seen.
 
+mod along;
 mod drift;
 
 use std::ops::Range;
 use std::rc::Rc;
 
 use nalgebra::DMatrix;
-use serde::Serialize;
 
+pub use self::along::{Along, Session};
 use self::drift::{Drift, Moves};
 use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
-use crate::identify::finding::Finding;
 use crate::identify::judge::recheck::zero;
 use crate::identify::residuals::distances::Origin;
 use crate::identify::residuals::eliminate::Block;
@@ -52,30 +52,6 @@ const GROSS: f64 = 8.0;
 
 /// Most cuts; data that want more are no sessions.
 const MOST_CUTS: usize = 30;
-
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Session {
-    pub group: String,
-    /// First fitted pose.
-    pub first: String,
-    /// Last fitted pose.
-    pub last: String,
-    /// Fitted poses.
-    pub count: usize,
-}
-
-/// What was found along the rows.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Along {
-    /// Sessions; empty where none was cut.
-    pub sessions: Vec<Session>,
-    /// Names of the groups whose placement drifts.
-    pub drifting: Vec<String>,
-    /// Rows that are not of one robot; whatever else a fit to all of them finds follows from that.
-    pub robots: Option<Finding>,
-    /// Said instead of a sensor that moved or drifts, where a tool or a joint that did is as likely.
-    pub instead: Option<Finding>,
-}
 
 /// Cuts the groups of `set` into sessions.
 pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Along) {
@@ -117,6 +93,7 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
         along.sessions = list(&cut);
     }
     along.instead = drift::of_joints(&drifts, robot, set.groups.len() > 1);
+    along.step = drift::step(&drifts);
     (cut, along)
 }
 

@@ -296,7 +296,7 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     if along.instead.is_none() && !stepping.is_empty() {
         add(
             format!(
-                "the rows fall into {} sessions, between which the sensor, the socket, the wire's anchor or its zero, or the robot's base moved",
+                "the rows fall into {} sessions, between which the sensor, the socket, the wire's anchor or its zero, the robot's base or the zero of joint 1 moved",
                 stepping.len()
             ),
             stepping,

@@ -4,6 +4,7 @@
 //! findings.
 
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::still;
 use crate::identify::finding::Finding;
 use crate::identify::judge::errors::{Judge, RowError};
 use crate::identify::run::Identification;
@@ -47,6 +48,11 @@ pub(super) fn left_out(set: &Dataset, found: &Identification) -> Finding {
     } else if block.is_some() {
         action += ": one cause for all of them is likely, something that moved or was changed there; look for it";
     }
+    // A stretch in which a joint's column stands still, where most of these rows are.
+    let stands = still::stands_in(set).filter(|(_, [first, last])| {
+        2 * out.iter().filter(|row| (first..=last).contains(row)).count() > out.len() && out.len() >= FEWEST_OF_BLOCK
+    });
+    action += &stands.map_or_else(String::new, |_| still::stuck(set));
     fitting(set, out, &format!(" ({share:.0} %){which}"), "far worse than the rest", &action)
 }
 

@@ -227,7 +227,7 @@ fn a_sample_that_a_logger_lost_is_left_out() {
     for (nothing, what) in [("nan", "1 row"), ("", "1 row"), ("NaN", "2 rows")] {
         let lost = |i: usize| i == 12 || i == 20 && what == "2 rows";
         let row = |(i, line): (usize, &str)| match lost(i) {
-            true => vec![nothing; 9].join(",") + "\n",
+            true => [nothing; 9].join(",") + "\n",
             false => format!("{line}\n"),
         };
         let body: String = text("", &rows, ",", joined).lines().enumerate().map(row).collect();

@@ -290,3 +290,23 @@ fn a_joint_that_was_mastered_anew_between_sessions_is_named() {
         assert!(said.contains(&format!("the zero of joint {} moved by", joint + 1)), "{said}");
     }
 }
+
+/// What is said where the zero of a joint seems to step half way.
+#[test]
+fn a_step_that_a_tool_explains_is_not_said_to_be_a_joints() {
+    let at_half = |set: &Dataset, robot: &Robot| {
+        let from = &set.poses[set.poses.len() / 2].name;
+        tools::of_step(set, from, robot).map(|finding| finding.finding)
+    };
+    for (seed, tool_mm) in [(1, 0.3), (2, 0.5), (3, 3.0)] {
+        let (set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, tool_mm, seed + 50)], false);
+        let said = at_half(&set, &robot).unwrap_or_else(|| panic!("{tool_mm} mm, seed {seed}"));
+        assert!(said.contains("the tool moved on the flange by"), "{tool_mm} mm, seed {seed}: {said}");
+    }
+    for (seed, joint, by_deg) in [(1, 1, 0.05), (2, 2, 0.1), (3, 1, 0.3)] {
+        let (mut set, robot) = tables(&[arm(40, 0.0, 0.0, seed), arm(40, 0.0, 0.0, seed + 50)], false);
+        let half = set.poses.len() / 2;
+        set.poses[half..].iter_mut().for_each(|pose| pose.joints_rad[joint] -= f64::to_radians(by_deg));
+        assert_eq!(at_half(&set, &robot), None, "joint {}", joint + 1);
+    }
+}

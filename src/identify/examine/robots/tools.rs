@@ -94,26 +94,39 @@ pub(in crate::identify::examine) fn of_sessions(set: &Dataset, cut: &Dataset, ro
     if parts.len() < 2 {
         return None;
     }
-    let causes = table.causes(&parts)?;
-    let likeliest = causes.iter().map(|cause| cause.likelihood).fold(f64::NEG_INFINITY, f64::max);
-    let told: Vec<&Cause> = causes.iter().filter(|cause| likeliest - cause.likelihood < TOLD_APART).collect();
-    if told.iter().all(|cause| cause.is_sensor) {
+    let told = table.told(&parts)?;
+    if told.iter().all(|cause| cause.is == Is::Sensor) {
         return None;
     }
-    let begins: Vec<String> = parts[1..].iter().map(|part| set.poses[table.rows[part[0]]].name.clone()).collect();
-    let what = told.iter().map(|cause| cause.what.as_str()).collect::<Vec<_>>().join(", or ");
-    let left = told.iter().map(|cause| format!("{:.3}", cause.left_mm)).collect::<Vec<_>>().join(", ");
-    let apart = if told.len() > 1 { ", which the rows do not tell apart" } else { "" };
-    let finding =
-        format!("from row {} on {what}{apart}: with that are left {left} mm a coordinate", begins.join(" and "));
     let action = "each session got a placement of its own, as if the sensor had moved: identify each by itself, or measure again without the change";
-    Some(Finding::new(finding, action))
+    Some(Finding::new(table.said(set, &parts, &told), action))
+}
+
+/// What is said of a joint whose zero steps at a row where a tool that moved there is likelier, or not told from it.
+pub(in crate::identify::examine) fn of_step(set: &Dataset, from: &str, robot: &Robot) -> Option<Finding> {
+    let table = Table::new(set, robot)?;
+    let at = table.rows.iter().position(|&row| set.poses[row].name == from)?;
+    let parts = [(0..at).collect::<Vec<usize>>(), (at..table.rows.len()).collect()];
+    let told = if parts.iter().all(|part| part.len() >= SHORTEST) { table.told(&parts)? } else { return None };
+    told.iter().any(|cause| cause.is == Is::Tool).then(|| {
+        let action =
+            "what moved meanwhile is in the result: identify each part by itself, or measure again without the change";
+        Finding::new(table.said(set, &parts, &told), action)
+    })
+}
+
+/// What a cause is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Is {
+    Sensor,
+    Tool,
+    Other,
 }
 
 /// What may have changed between sessions.
 struct Cause {
     what: String,
-    is_sensor: bool,
+    is: Is,
     /// Scatter of a coordinate that it leaves, mm.
     left_mm: f64,
     /// Logarithm of its likelihood, but for a constant.
@@ -121,6 +134,22 @@ struct Cause {
 }
 
 impl Table {
+    /// The causes of a change between these parts that are not told apart, the likeliest among them.
+    fn told(&self, parts: &[Vec<usize>]) -> Option<Vec<Cause>> {
+        let causes = self.causes(parts)?;
+        let likeliest = causes.iter().map(|cause| cause.likelihood).fold(f64::NEG_INFINITY, f64::max);
+        Some(causes.into_iter().filter(|cause| likeliest - cause.likelihood < TOLD_APART).collect())
+    }
+
+    /// The same in words.
+    fn said(&self, set: &Dataset, parts: &[Vec<usize>], told: &[Cause]) -> String {
+        let begins: Vec<String> = parts[1..].iter().map(|part| set.poses[self.rows[part[0]]].name.clone()).collect();
+        let what = told.iter().map(|cause| cause.what.as_str()).collect::<Vec<_>>().join(", or ");
+        let left = told.iter().map(|cause| format!("{:.3}", cause.left_mm)).collect::<Vec<_>>().join(", ");
+        let apart = if told.len() > 1 { ", which the rows do not tell apart" } else { "" };
+        format!("from row {} on {what}{apart}: with that are left {left} mm a coordinate", begins.join(" and "))
+    }
+
     /// The rows by session: a session begins where a group was cut.
     fn sessions(&self, set: &Dataset, cut: &Dataset) -> Vec<Vec<usize>> {
         let mut parts: Vec<Vec<usize>> = vec![Vec::new()];
@@ -153,12 +182,13 @@ impl Table {
             let free = left.taken - tools.together.taken;
             cause(format!("a load was put on or taken off, which moves the target by up to {by:.2} mm"), &left, free)
         });
-        Some([Cause { is_sensor: true, ..sensor }, tool].into_iter().chain(zero).chain(load).collect())
+        let named = [Cause { is: Is::Sensor, ..sensor }, Cause { is: Is::Tool, ..tool }];
+        Some(named.into_iter().chain(zero).chain(load).collect())
     }
 
     fn cause(&self, parts: &[Vec<usize>], what: String, left: &Left, free: f64) -> Cause {
         let likelihood = left.likelihood(self.rows.len(), (parts.len() as f64 - 1.0) * free);
-        Cause { what, is_sensor: false, left_mm: left.scatter_mm(), likelihood }
+        Cause { what, is: Is::Other, left_mm: left.scatter_mm(), likelihood }
     }
 
     /// Between two parts the zero of the joint that explains most.

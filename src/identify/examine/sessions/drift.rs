@@ -32,6 +32,12 @@ impl Moves {
     }
 }
 
+/// The row from which on the zero of a joint steps, where one does.
+pub(super) fn step(drifts: &[Drift]) -> Option<String> {
+    let causes = drifts.iter().flat_map(|drift| &drift.causes).filter(|cause| cause.joint.is_some());
+    causes.filter_map(|cause| cause.from.clone()).next()
+}
+
 /// What is said of drifts where a joint that moves is as likely as a sensor. One that the zero of the first joint
 /// explains is a sensor's as well. Groups are named where there are `several`.
 pub(super) fn of_joints(drifts: &[Drift], robot: &Robot, several: bool) -> Option<Finding> {
