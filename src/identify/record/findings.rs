@@ -58,10 +58,8 @@ impl Findings {
         let rounded = rounded::of_joints(set, found);
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
-        let far_beyond_mm = FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
-        let beyond_all = || {
-            (left_mm > far_beyond_mm && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm))
-        };
+        let is_far = left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
+        let beyond_all = || (is_far && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
         let is_reached = unexplained.is_none();
         let left_out = left_out_of_a_joint(set, found);
@@ -79,7 +77,7 @@ impl Findings {
             let mut told = against.iter().chain(&many);
             told.any(|told| told == finding || !told.rows.is_empty() && told.rows == finding.rows)
         };
-        let (far_beyond, noise) = if left_mm > far_beyond_mm { (noise, None) } else { (None, noise) };
+        let (far_beyond, noise) = if is_far { (noise, None) } else { (None, noise) };
         let (doubted, untested) = untested::joints(set, found);
         let notes = noise.into_iter().chain(of_fit).chain(untested).filter(|finding| !is_told(finding)).collect();
         // A scale makes every length another.
