@@ -36,8 +36,19 @@ enum By {
     Side(isize),
 }
 
+/// Share from which on play is a doubt: below that the robot that was found would be three tenths nearer without it at
+/// the most, and a robot has what play it has.
+const DOUBT: f64 = 0.5;
+
 /// Angles or points that know of the pose before.
-pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
+pub struct Lag {
+    pub finding: Finding,
+    /// Whether it speaks against the result.
+    pub is_doubt: bool,
+}
+
+/// Looks for them, and for play.
+pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Lag> {
     let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
     let told = |by: fn(isize) -> By| {
         let before = explained_by(set, formulation, &linear, by(-1))?;
@@ -49,30 +60,30 @@ pub fn find(set: &Dataset, formulation: &Formulation) -> Option<Finding> {
     };
     let lag = told(By::Angle).and_then(|lag| Some((of_lag(&lag)?, lag)));
     let play = told(By::Side).and_then(|play| Some((of_play(set, &play)?, play)));
-    match (lag, play) {
+    let of_play = |said: &str, play: &Explained| Lag { is_doubt: play.share > DOUBT, ..of(said, play, APPROACH) };
+    Some(match (lag, play) {
         (Some((said, lag)), Some((or, play))) => {
             let numbers: usize = linear.placements.iter().map(|placement| placement.poses.len()).sum();
             let play_is_likelier = 0.5 * numbers as f64 * ((1.0 - lag.share) / (1.0 - play.share)).ln();
             match play_is_likelier {
-                more if more > TOLD_APART => Some(finding(&or, &play, APPROACH)),
-                more if more < -TOLD_APART => Some(finding(&said, &lag, WAIT)),
-                _ => Some(finding(&format!("{said}, or {or}"), &lag, &format!("{WAIT}; or {APPROACH}"))),
+                more if more > TOLD_APART => of_play(&or, &play),
+                more if more < -TOLD_APART => of(&said, &lag, WAIT),
+                _ => of(&format!("{said}, or {or}"), &lag, &format!("{WAIT}; or {APPROACH}")),
             }
         }
-        (Some((said, lag)), None) => Some(finding(&said, &lag, WAIT)),
-        (None, Some((said, play))) => Some(finding(&said, &play, APPROACH)),
-        (None, None) => None,
-    }
+        (Some((said, lag)), None) => of(&said, &lag, WAIT),
+        (None, Some((said, play))) => of_play(&said, &play),
+        (None, None) => return None,
+    })
 }
 
 const WAIT: &str = "wait longer at each pose, or give the angles that were commanded, and identify again";
 const APPROACH: &str = "come to each pose from one side in every joint, as the robot will in use, and identify again";
 
-fn finding(said: &str, of: &Explained, hint: &str) -> Finding {
-    Finding::new(
-        format!("{said}: {:.0} % of the squares that are left follow the move before each pose", 100.0 * of.share),
-        hint,
-    )
+fn of(said: &str, by: &Explained, hint: &str) -> Lag {
+    let share = 100.0 * by.share;
+    let said = format!("{said}: {share:.0} % of the squares that are left follow the move before each pose");
+    Lag { finding: Finding::new(said, hint), is_doubt: true }
 }
 
 /// Joints whose factor is significant, by their numbers from 1.
@@ -164,6 +175,10 @@ mod tests {
 
     /// A world whose angles are behind by a share of the last move, or whose points are.
     fn found(seed: u64, of_angles: f64, of_points: f64, spoil: impl Fn(&mut World)) -> Option<String> {
+        Some(told(seed, of_angles, of_points, spoil)?.finding.finding)
+    }
+
+    fn told(seed: u64, of_angles: f64, of_points: f64, spoil: impl Fn(&mut World)) -> Option<Lag> {
         let mut world = planned(120, 0, 25.0, 0.02, seed, &|_| {});
         world.rows.retain(|row| row.at.group == "g1");
         let true_deg: Vec<Vec<f64>> = world.rows.iter().map(|row| row.at.joints_deg.clone()).collect();
@@ -174,7 +189,7 @@ mod tests {
         }
         spoil(&mut world);
         let (set, found) = world.identified(&world.rows);
-        Some(find(&set, found.formulation()?)?.finding)
+        find(&set, found.formulation()?)
     }
 
     #[test]
@@ -213,7 +228,9 @@ mod tests {
                         row.at.joints_deg[joint] += 0.5 * apart_deg * (read[i] - read[i - 1]).signum();
                     }
                 };
-                let said = found(seed, 0.0, 0.0, spoil).unwrap_or_default();
+                let Lag { finding, is_doubt } = told(seed, 0.0, 0.0, spoil).expect("play");
+                assert!(is_doubt || apart_deg < 0.05, "{seed}: {}", finding.finding);
+                let said = finding.finding;
                 let (_, found) =
                     said.split_once(&format!("play of their gears (joint {} by ", joint + 1)).expect(&said);
                 let found: f64 = found.split_once(" deg").unwrap().0.parse().unwrap();

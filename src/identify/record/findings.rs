@@ -92,7 +92,7 @@ impl Findings {
             .chain(along.instead.clone())
             .chain(rounded)
             .chain(many)
-            .chain(found.formulation().and_then(|formulation| lag::find(set, formulation)))
+            .chain(of_lag(set, found, true))
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
@@ -182,9 +182,16 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     misfits::of_rows(set, found)
         .into_iter()
         .chain(of_sensor(found))
+        .chain(of_lag(set, found, false))
         .chain(along_the_rows(along))
         .chain(of_data(set, found))
         .collect()
+}
+
+/// A lag, or play, that speaks against the result or does not.
+fn of_lag(set: &Dataset, found: &Identification, is_doubt: bool) -> Option<Finding> {
+    let lag = lag::find(set, found.formulation()?)?;
+    (lag.is_doubt == is_doubt).then_some(lag.finding)
 }
 
 /// Errors that the readings share.
