@@ -109,8 +109,7 @@ pub(in crate::identify::examine) fn of_step(set: &Dataset, from: &str, robot: &R
     let parts = [(0..at).collect::<Vec<usize>>(), (at..table.rows.len()).collect()];
     let told = if parts.iter().all(|part| part.len() >= SHORTEST) { table.told(&parts)? } else { return None };
     told.iter().any(|cause| cause.is == Is::Tool).then(|| {
-        let action =
-            "what moved meanwhile is in the result: identify each part by itself, or measure again without the change";
+        let action = "identify each part by itself, or measure again without the change";
         Finding::new(table.said(set, &parts, &told), action)
     })
 }
