@@ -62,7 +62,7 @@ impl Turn {
     /// Whether another turn is so near that [`Turn::near`] has it to the last digit.
     #[inline(always)]
     pub(super) fn is_near(&self, rad: f64) -> bool {
-        (rad - self.rad).abs() <= 0.1
+        Small::is_small(rad - self.rad)
     }
 
     /// Sine and cosine of a turn that is near.
@@ -86,6 +86,12 @@ pub struct Small {
 }
 
 impl Small {
+    /// Whether the series of a turn in rad end below the last digit.
+    #[inline(always)]
+    pub fn is_small(by: f64) -> bool {
+        by.abs() <= 0.1
+    }
+
     /// Of a turn in rad, by series that end below the last digit.
     #[inline(always)]
     pub fn new(by: f64) -> Small {

@@ -27,6 +27,7 @@ mod numbers;
 mod program_lines;
 mod records;
 mod source;
+pub mod vocabulary;
 
 pub use fields::{Fields, Form};
 pub use grid::Grid;

@@ -6,6 +6,8 @@
 //! that a point was sent to the robot or computed, not measured, make it commanded. What goes wrong: `x y z` alone may
 //! be either, and a set of joints is one only where it is complete; who reads the table decides.
 
+use super::vocabulary::{COMMANDED, ELSE, ENCODER, INSTRUMENT, JOINT, MEASURED, PLAIN, UNREAD, is_in};
+
 /// A unit of a joint or of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Unit {
@@ -97,29 +99,6 @@ const OWN: [&str; 15] = [
     "szz_mm2", "rx_rad", "ry_rad", "rz_rad",
 ];
 
-const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle gelenk achse \
-    articulation axe 关节 关节角 关节角度 轴";
-
-/// Words beside a joint's name or a coordinate's that say nothing new.
-const PLAIN: &str = "angle angles pos position positions value values coord coordinate coordinates p point state reading \
-    xyz in koordinate koordinaten 坐标 位置 角度";
-
-/// Words that say that a number is something else.
-const ELSE: &str = "tau torque torques force f current effort i vel velocity speed v qd dq acc temp temperature dif diff delta \
-    err error errors e res residual residuals dev deviation std sd sigma unc uncertainty u rms var cov \
-    rot rotation rvec rotvec roll pitch yaw euler quat quaternion orientation offset normal min";
-
-const COMMANDED: &str = "cmd command commanded nominal nom n t target goal desired des d ref reference set setpoint plan \
-    planned program prog controller pred predicted theo theoretical ideal taught programmed fk calc calculated computed c model robot soll theorie consigne \
-    理论 名义 指令 期望 目标 规划 理想 计算 命令";
-
-const MEASURED: &str = "m meas measure measured measurement act actual laser tracker lt leica faro smr camera vicon ndi \
-    mocap observed obs real cmm marker reflector ist gemessen mesure mesurée mesuré 实际 实测 测量 激光 跟踪仪";
-
-/// Units that are not read: a column in one of them is none in degrees or mm.
-const UNREAD: &str = "gon gons gradian gradians mrad urad µrad μrad arcmin arcsec rev revs turns count counts pulse pulses ticks dm km nm \
-    ft foot feet mil mils thou";
-
 impl Name {
     /// The unit of a joint, a point or a distance that is not read, where the name states one.
     pub fn unread_unit(&self) -> Option<&str> {
@@ -162,8 +141,8 @@ impl Name {
         // `T_x` and `T14` are of a transform, `x_t` of a target.
         let point = matches!(what, What::Coordinate(_) | What::Matrix(..));
         let transform = point && words[0] == "t" && rest.first() == words.first();
-        let computed = says(COMMANDED, &rest[usize::from(transform)..]) || point && says("encoder encoders", &rest);
-        let measured = match (computed, says(MEASURED, &rest)) {
+        let computed = says(COMMANDED, &rest[usize::from(transform)..]) || point && says(ENCODER, &rest);
+        let measured = match (computed, says(MEASURED, &rest) || says(INSTRUMENT, &rest)) {
             (true, _) => Some(false),
             (false, true) => Some(true),
             _ => None,
@@ -175,12 +154,7 @@ impl Name {
 /// Whether a word alone names nothing, but says of the name behind it where that comes from.
 pub fn is_said_of_another(word: &str) -> bool {
     let word = word.to_lowercase();
-    word.chars().count() > 2 && [COMMANDED, MEASURED, ELSE].iter().any(|list| is_in(list, &word))
-}
-
-/// Whether a list of words has this one.
-fn is_in(list: &str, word: &str) -> bool {
-    list.split_whitespace().any(|listed| listed == word)
+    word.chars().count() > 2 && [COMMANDED, MEASURED, INSTRUMENT, ELSE].iter().any(|list| is_in(list, &word))
 }
 
 /// Whether a word counts things: a number or a single letter.
@@ -253,7 +227,7 @@ fn coordinate(words: &[String]) -> Option<(What, Vec<String>)> {
         let (first, rest) = words[*i].split_at_checked(1)?;
         let letter = |word: &str| word.chars().next().filter(|_| word.len() == 1).and_then(axis);
         // xm, xist: measured; xc, xn, xt, xsoll: computed, nominal, target.
-        let marks = rest.chars().count() == 1 || is_in(MEASURED, rest) || is_in(COMMANDED, rest);
+        let marks = rest.chars().count() == 1 || [MEASURED, INSTRUMENT, COMMANDED].iter().any(|list| is_in(list, rest));
         match (letter(first), letter(rest)) {
             (Some(a), None) if rest.is_empty() || marks => Some((a, Some(rest).filter(|rest| !rest.is_empty()))),
             (None, Some(a)) if "pmtcl".contains(first) => Some((a, Some(first).filter(|f| "ml".contains(*f)))),

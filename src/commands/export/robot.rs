@@ -135,8 +135,8 @@ fn nominal(args: &ExportRobot, robot: &Robot) -> Result<Robot> {
     let nominal = match &args.nominal {
         Some(path) => file::read(path)?,
         None => {
-            let arm = catalogue::ARMS.iter().find(|arm| [arm.title, arm.name].contains(&robot.name.as_str()));
-            arm.map(catalogue::Arm::robot).ok_or_else(|| Error::NotExportable {
+            let arm = if let [arm] = catalogue::names::meant(&robot.name)[..] { catalogue::robot(arm) } else { None };
+            arm.ok_or_else(|| Error::NotExportable {
                 message: format!("nominal robot unknown: no common arm is called `{}`", robot.name),
                 hint: "`--nominal FILE` names the nominal robot file".to_owned(),
             })?

@@ -2,6 +2,7 @@
 //! moves the target.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use nalgebra::Point3;
 
@@ -86,9 +87,9 @@ pub fn constant_joints(set: &Dataset, left_out: &[usize]) -> Vec<String> {
         .collect()
 }
 
-/// The joint that has one angle in a stretch of rows one after the other, in which others move, and other angles
-/// elsewhere, with the first and the last of them; `None` where several have, as where one axis after the other turns.
-pub fn stands_in(set: &Dataset) -> Option<(usize, [usize; 2])> {
+/// A stretch of rows one after the other in which a joint has one angle while others move, and other angles elsewhere,
+/// with the end of a sentence on it; `None` where several joints have one, as where one axis after the other turns.
+pub fn stuck_in(set: &Dataset) -> Option<(Range<usize>, String)> {
     /// Rows of a stretch, and the part of all rows that it must be.
     const FEWEST: usize = 8;
     const PART: usize = 5;
@@ -106,24 +107,26 @@ pub fn stands_in(set: &Dataset) -> Option<(usize, [usize; 2])> {
         let [from, to] = best;
         let others = (0..set.joint_count()).any(|other| way_in(set.poses[from..to].iter(), other) > STILL);
         let is_long = to - from >= FEWEST.max(set.poses.len() / PART) && to - from < set.poses.len();
-        (is_long && others && way(set, joint) > STILL).then_some((joint, [from, to - 1]))
+        (is_long && others && way(set, joint) > STILL).then_some((joint, from..to))
     };
     let mut all = (0..set.joint_count()).filter_map(longest);
-    all.next().filter(|_| all.next().is_none())
+    let (joint, rows) = all.next().filter(|_| all.next().is_none())?;
+    let [first, last] = [rows.start, rows.end - 1].map(|row| &set.poses[row].name);
+    let said = is_stuck(&format!("joint {} has one angle in rows {first} to {last}", joint + 1));
+    Some((rows, said))
 }
 
 /// What is said of joints whose column stands still in all rows or in a stretch of them, where something is wrong:
 /// nothing, or the end of a sentence.
 pub fn stuck(set: &Dataset) -> String {
-    let said = match (&constant_joints(set, &[])[..], stands_in(set)) {
-        ([], None) => return String::new(),
-        ([], Some((joint, [first, last]))) => {
-            let [first, last] = [first, last].map(|row| &set.poses[row].name);
-            format!("joint {} has one angle in rows {first} to {last}", joint + 1)
-        }
-        ([one], _) => format!("joint {one} has one angle in all rows"),
-        (all, _) => format!("joints {} have one angle in all rows", all.join(", ")),
-    };
+    match &constant_joints(set, &[])[..] {
+        [] => stuck_in(set).map_or_else(String::new, |(_, said)| said),
+        [one] => is_stuck(&format!("joint {one} has one angle in all rows")),
+        all => is_stuck(&format!("joints {} have one angle in all rows", all.join(", "))),
+    }
+}
+
+fn is_stuck(said: &str) -> String {
     format!("; {said}: if it was turned there, its column is stuck")
 }
 
@@ -178,6 +181,15 @@ mod tests {
             assert!(said(joint, count / 2, count).starts_with(&expected), "{}", said(joint, count / 2, count));
             assert!(said(joint, 0, count).contains("in all rows"));
         }
+        // What is said of a stretch is of the stretch, whatever stands still all along.
+        let mut rows = world.rows.clone();
+        let half = rows[count / 2].at.joints_deg[3];
+        rows.iter_mut().for_each(|row| row.at.joints_deg[5] = 20.0);
+        rows[count / 2..].iter_mut().for_each(|row| row.at.joints_deg[3] = half);
+        let set = Dataset::new(&rows).unwrap();
+        assert!(stuck(&set).contains("joint 6 has one angle in all rows"));
+        let (stretch, said) = stuck_in(&set).unwrap();
+        assert!(stretch == (count / 2..count) && said.contains("joint 4 has one angle in rows"), "{said}");
         // One axis after the other.
         let mut rows = world.rows.clone();
         for (i, row) in rows.iter_mut().enumerate() {

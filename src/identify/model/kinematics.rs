@@ -179,7 +179,7 @@ impl Kinematics {
         let links = robot.joints.iter().map(|joint| [joint.alpha_rad, joint.beta_rad].map(Turn::new)).collect();
         let further = |(i, (to, from)): (usize, (&Joint, &Joint))| {
             let by = to.theta_rad - from.theta_rad;
-            let alike = !to.slides && by.abs() < 0.1 && !self.acts.iter().any(|(_, act)| *act == Act::Turns(i));
+            let alike = !to.slides && Small::is_small(by) && !self.acts.iter().any(|(_, act)| *act == Act::Turns(i));
             alike.then(|| Small::new(by))
         };
         let further = robot.joints.iter().zip(&self.nominal.joints).enumerate().map(further).collect();

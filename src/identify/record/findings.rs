@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use crate::diagnostic::count as counted;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::repeats::Repeats;
-use crate::identify::data::still::{constant_joints, repeated};
+use crate::identify::data::still::{constant_joints, repeated, stuck};
 use crate::identify::examine::conventions;
 use crate::identify::examine::sessions::{Along, Session};
 use crate::identify::finding::Finding;
@@ -58,7 +58,7 @@ impl Findings {
         let rounded = rounded::of_joints(set, found);
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
-        let is_far = left_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM;
+        let is_far = is_far(found);
         let beyond_all = || (is_far && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
         let is_reached = unexplained.is_none();
@@ -79,7 +79,8 @@ impl Findings {
         };
         let (far_beyond, noise) = if is_far { (noise, None) } else { (None, noise) };
         let (doubted, untested) = untested::joints(set, found);
-        let notes = noise.into_iter().chain(of_fit).chain(untested).filter(|finding| !is_told(finding)).collect();
+        let (lag, of_play) = of_lag(set, found);
+        let notes = noise.into_iter().chain(of_fit).chain(of_play).chain(untested).filter(|f| !is_told(f)).collect();
         // A scale makes every length another.
         let beyond = plausible::of_links(found)
             .filter(|_| scale.is_none())
@@ -92,7 +93,7 @@ impl Findings {
             .chain(along.instead.clone())
             .chain(rounded)
             .chain(many)
-            .chain(of_lag(set, found, true))
+            .chain(lag)
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
@@ -144,6 +145,11 @@ fn many_left_out(set: &Dataset, found: &Identification) -> Option<Finding> {
     is_many.then(|| misfits::left_out(set, found))
 }
 
+/// Whether more is left than any robot or instrument leaves.
+fn is_far(found: &Identification) -> bool {
+    found.scatter.point_mm > FAR_BEYOND * conventions::IMPLAUSIBLE_MM
+}
+
 fn few_left_out(found: &Identification) -> bool {
     found.formulation().is_some() && found.outliers.len() * 10 <= found.fitted.len()
 }
@@ -155,11 +161,11 @@ fn of_noise(set: &Dataset, found: &Identification) -> Option<Finding> {
     let may_be = scatter_mm >= conventions::IMPLAUSIBLE_MM && few_left_out(found);
     let formulation = found.formulation().filter(|_| may_be)?;
     let is_explained = SMALL * scatter_mm < spread_mm(set, &found.fitted);
-    // A joint that turned while its column stood still scatters the points as well.
-    let is_moving = constant_joints(set, &[]).is_empty();
-    (is_explained && is_moving && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
+    // A joint that turned while its column stood still scatters the points as well, by more than an instrument does.
+    let is_stuck = !constant_joints(set, &[]).is_empty() && is_far(found);
+    (is_explained && !is_stuck && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
         Finding::new(
-            format!("the readings scatter by {scatter_mm:.2} mm a coordinate, whatever the joints are"),
+            format!("the readings scatter by {scatter_mm:.2} mm a coordinate, whatever the joints are{}", stuck(set)),
             "if the instrument is better than that, see whether the robot stood still and joints and readings are of one moment",
         )
     })
@@ -182,16 +188,17 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     misfits::of_rows(set, found)
         .into_iter()
         .chain(of_sensor(found))
-        .chain(of_lag(set, found, false))
         .chain(along_the_rows(along))
         .chain(of_data(set, found))
         .collect()
 }
 
-/// A lag, or play, that speaks against the result or does not.
-fn of_lag(set: &Dataset, found: &Identification, is_doubt: bool) -> Option<Finding> {
-    let lag = lag::find(set, found.formulation()?)?;
-    (lag.is_doubt == is_doubt).then_some(lag.finding)
+/// A lag, or play, that speaks against the result, or one that does not.
+fn of_lag(set: &Dataset, found: &Identification) -> (Option<Finding>, Option<Finding>) {
+    match found.formulation().and_then(|formulation| lag::find(set, formulation)) {
+        Some(lag) if lag.is_doubt => (Some(lag.finding), None),
+        lag => (None, lag.map(|lag| lag.finding)),
+    }
 }
 
 /// Errors that the readings share.

@@ -3,6 +3,8 @@
 //! In: the rows that were left out of the fit, those that are doubtful, and rows to verify that are as far off. Out:
 //! findings.
 
+use std::ops::Range;
+
 use crate::identify::data::dataset::Dataset;
 use crate::identify::data::still;
 use crate::identify::finding::Finding;
@@ -48,11 +50,12 @@ pub(super) fn left_out(set: &Dataset, found: &Identification) -> Finding {
     } else if block.is_some() {
         action += ": one cause for all of them is likely, something that moved or was changed there; look for it";
     }
-    // A stretch in which a joint's column stands still, where most of these rows are.
-    let stands = still::stands_in(set).filter(|(_, [first, last])| {
-        2 * out.iter().filter(|row| (first..=last).contains(row)).count() > out.len() && out.len() >= FEWEST_OF_BLOCK
-    });
-    action += &stands.map_or_else(String::new, |_| still::stuck(set));
+    let holds_most = |rows: &Range<usize>| 2 * out.iter().filter(|row| rows.contains(row)).count() > out.len();
+    if out.len() >= FEWEST_OF_BLOCK
+        && let Some((_, stuck)) = still::stuck_in(set).filter(|(rows, _)| holds_most(rows))
+    {
+        action += &stuck;
+    }
     fitting(set, out, &format!(" ({share:.0} %){which}"), "far worse than the rest", &action)
 }
 
