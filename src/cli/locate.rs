@@ -6,11 +6,15 @@ use clap::Args;
 use super::cameras::Measure;
 use super::robot::TableFlags;
 
+/// What the poses are, of which `measure` takes the pictures alone.
+const POSES: &str = "A table of measurements, as `identify` reads it; or a folder with pictures and poses.csv, as \
+                     `measure` does, which is measured first";
+
 /// `stereocal locate`
 #[derive(Debug, Args)]
+#[command(mut_args(|arg| if arg.get_id() == "poses" { arg.help(POSES) } else { arg }))]
 pub struct Locate {
-    /// Poses: a folder with pictures and poses.csv, which is measured first, or a table of measurements as `identify`
-    /// reads it.
+    /// The poses, as `measure` takes them, or as a table.
     #[command(flatten)]
     pub measure: Measure,
     /// The robot, taken as it is: identified.toml, or a nominal one that is trusted

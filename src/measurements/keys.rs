@@ -212,7 +212,11 @@ fn sentence(parts: &[Part], first: &Key, joined: &[&Key], kept: &[usize]) -> Str
         if !lone.is_empty() {
             let more = if lone.len() > SHOWN { format!(" and {} more", lone.len() - SHOWN) } else { String::new() };
             let shown = lone[..lone.len().min(SHOWN)].join(", ");
-            text.push_str(&format!("; left out of {}, as the other file has no such row: {shown}{more}", file(key)));
+            let name = parts[key.part].column_name(key.column);
+            text.push_str(&format!(
+                "; left out of {}: `{name}` {shown}{more}, which the other file does not have",
+                file(key)
+            ));
         }
     }
     text

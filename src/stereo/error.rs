@@ -127,7 +127,7 @@ pub enum Error {
     NoCamera { side: Side },
     /// Most pairs do not belong to one rig.
     #[error(
-        "the pairs contradict each other: {} fit one rig; half of them miss it by {usual_px:.1} px and more, \
+        "the pairs contradict each other: {} fit one rig; half of all miss it by {usual_px:.1} px and more, \
          each camera alone by {alone_px:.2} px{}",
         too_few(*.agreeing, *.total),
         reasons(.bad)

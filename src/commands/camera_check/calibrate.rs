@@ -198,9 +198,14 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
     let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
     let [measured, said] = [board, drawn].map(|board| board.side_said());
-    let said = if measured == said { "as was said".to_owned() } else { format!("not {said} mm") };
+    // Of a size that nobody gave nothing was said.
+    let said = match config.check_board.size_is_assumed(args.board, args.square_mm) {
+        Some(_) => String::new(),
+        None if measured == said => ", as was said".to_owned(),
+        None => format!(", not {said} mm"),
+    };
     progress::note(format!(
-        "by its measured extent the board has {} of {measured} mm, {said}; by a caliper, to {uncertainty_mm:.4} mm in all",
+        "by its measured extent the board has {} of {measured} mm{said}; by a caliper, to {uncertainty_mm:.4} mm in all",
         board.unit()
     ));
     Ok((warm(args, board)?, Some(uncertainty_mm)))

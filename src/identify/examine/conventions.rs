@@ -73,13 +73,14 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         if tried.is_empty() {
             tried = explaining(if unexplained { Look::All } else { Look::OfOneJoint });
         }
-        // Several faults of counting at once are asked for where none alone does.
-        if now.fitted >= IMPLAUSIBLE_MM && !makes_plausible(&tried) {
-            let several = counting::likeliest(&set, &robot);
-            let several = self::explaining(&several, &set, &robot, settings, &now, Look::All);
-            if makes_plausible(&several) {
-                tried = counting::without_untold(&several);
-            }
+        // The one that is right may bring the file's robot little nearer, whose target stands elsewhere.
+        if is_open(&tried) {
+            tried = explaining(Look::All);
+        }
+        if now.fitted >= IMPLAUSIBLE_MM {
+            let several =
+                |look| self::explaining(&counting::likeliest(&set, &robot), &set, &robot, settings, &now, look);
+            tried = with_several(tried, || several(Look::All));
         }
         let best = Likeliest::of(&tried).filter(|best| cut.is_none_or(|cut| best.there.fitted < cut));
         let Some(best) = best else { break };
@@ -107,6 +108,33 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     Mended { set, robot, findings, against, open, unexplained_mm }
 }
 
+/// Hypotheses that were tried, and several faults of counting at once where none alone explains the errors, or where a
+/// twist does: two joints that are counted the other way round do the same.
+fn with_several(
+    mut tried: Vec<(Misfit, Hypothesis)>,
+    several: impl Fn() -> Vec<(Misfit, Hypothesis)>,
+) -> Vec<(Misfit, Hypothesis)> {
+    let alone = makes_plausible(&tried);
+    let is_twist = || Likeliest::of(&tried).is_some_and(|best| matches!(best.hypothesis, Hypothesis::Twisted(_)));
+    if alone && !is_twist() {
+        return tried;
+    }
+    let several = several();
+    if !makes_plausible(&several) {
+        return tried;
+    }
+    if !alone {
+        tried.clear();
+    }
+    tried.extend(counting::without_untold(&several));
+    tried
+}
+
+/// Whether none leaves what a built robot may leave, and nothing tells which of them it is.
+fn is_open(tried: &[(Misfit, Hypothesis)]) -> bool {
+    !makes_plausible(tried) && Likeliest::of(tried).is_some_and(|best| !best.rivals.is_empty())
+}
+
 /// Whether one of them leaves what a built robot may leave.
 fn makes_plausible(tried: &[(Misfit, Hypothesis)]) -> bool {
     tried.iter().any(|(there, hypothesis)| there.fitted * hypothesis.factor() < IMPLAUSIBLE_MM)
@@ -127,9 +155,15 @@ impl Likeliest {
     fn of(tried: &[(Misfit, Hypothesis)]) -> Option<Likeliest> {
         let least = tried.iter().map(|(there, _)| there.fitted).fold(f64::INFINITY, f64::min);
         let as_good = || tried.iter().filter(|(there, _)| there.fitted <= ALIKE * least);
-        // A joint that is counted otherwise is the usual cause of what a twist of the wrong sign does as well.
+        // A joint that is counted otherwise is the usual cause of what a twist of the wrong sign does as well, and one
+        // twist that of what several joints do.
         let rank = |(there, h): &(Misfit, Hypothesis)| {
-            there.product() * if matches!(h, Hypothesis::Twisted(_)) { ALIKE } else { 1.0 }
+            let unusual = match h {
+                Hypothesis::Twisted(_) => ALIKE,
+                Hypothesis::Counted(_) => ALIKE * ALIKE,
+                _ => 1.0,
+            };
+            there.product() * unusual
         };
         let &(there, hypothesis) = as_good().min_by(|a, b| rank(a).total_cmp(&rank(b)))?;
         let of = |wanted: &dyn Fn(&Misfit) -> bool| -> Vec<Hypothesis> {

@@ -5,7 +5,7 @@
 //! columns). Readings that scatter, however much, know nothing of the joints; a robot that is not the file's leaves
 //! errors that turn with them. Goes wrong: with few rows a pattern is not told from scatter.
 
-use std::iter;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use crate::identify::data::dataset::Dataset;
 use crate::identify::solve::formulation::Formulation;
 use crate::identify::solve::linearised::{Linearised, Placement};
-use crate::linear_algebra::{Eliminated, rank};
+use crate::linear_algebra::{product, pseudo_inverse, rank, without};
 
 /// Chance that readings that only scatter are said to follow the joints.
 const FALSE_ALARM: f64 = 0.01;
@@ -25,46 +25,101 @@ pub struct Explained {
     pub share: f64,
     /// How often columns that mean nothing explain as much.
     pub chance: f64,
-    /// Their factors, and how well each is known (standard deviation).
+    /// Their factors, as an offset of an unknown, and how well each is known (standard deviation).
     pub factors: DVector<f64>,
     pub sds: DVector<f64>,
 }
 
-/// What the first `tested` of these columns of each placement explain, everything else that is fitted and the other
-/// columns at their best. `None` where too little is left to tell: with fewer numbers left than the columns take,
-/// little would be noticed, and of points that were computed nothing is left at all.
-pub fn explained(
-    linear: &Linearised,
-    tested: usize,
-    columns: impl Fn(&Placement) -> DMatrix<f64>,
-) -> Option<Explained> {
-    let all: Vec<DMatrix<f64>> = linear.placements.iter().map(columns).collect();
-    let kept = 1 + all.first()?.ncols() + linear.shared;
-    // Of the residual, the fresh columns and the shared ones, in that order.
-    let mut normal = DMatrix::zeros(kept, kept);
-    let mut left = 0.0;
-    for (placement, columns) in linear.placements.iter().zip(&all) {
-        normal += eliminated(placement, columns, linear.shared);
-        left += placement.poses.len() as f64 - placement.linear.design.ncols() as f64;
+impl Explained {
+    /// The chance, and how well the factors are known, where the numbers of a pose err together, as by an angle that
+    /// scatters: by what each pose alone says of the factors (the sandwich of clusters, Hotelling's law), which knows
+    /// nothing of how what is left scatters. `None` where poses are too few for that.
+    pub fn by_pose(&self, left: &Left) -> Option<Explained> {
+        let inverse = pseudo_inverse(product(&left.tested, &left.tested));
+        let unexplained = &left.residual + &left.tested * &self.factors;
+        // A fit follows what it is fitted to: what is left is smaller than what is there, by the share of the unknowns.
+        let followed = left.freedom / left.residual.len() as f64;
+        let mut scores = DMatrix::zeros(self.factors.len(), left.poses.len());
+        for (mut score, at) in scores.column_iter_mut().zip(&left.poses) {
+            let (columns, errors) = (left.tested.rows(at.start, at.len()), unexplained.rows(at.start, at.len()));
+            score.gemv_tr(1.0 / followed, &columns, &errors, 0.0);
+        }
+        let (poses, tested) = (left.poses.len() as f64, rank(&product(&left.tested, &left.tested)) as f64);
+        let covariance = &inverse * (&scores * scores.transpose()) * &inverse;
+        let squared = (self.factors.transpose() * pseudo_inverse(covariance.clone()) * &self.factors)[0];
+        let law = FisherSnedecor::new(tested, poses - tested).ok()?;
+        Some(Explained {
+            chance: law.sf(squared * (poses - tested) / (tested * (poses - 1.0))),
+            sds: covariance.diagonal().map(f64::sqrt),
+            ..self.clone()
+        })
     }
-    let others = kept - 1 - tested;
-    left -= rank(&normal.view((1 + tested, 1 + tested), (others, others)).into_owned()) as f64;
-    let normal = Eliminated::new(&normal, 1 + tested).normal;
-    let explaining = rank(&normal.view((1, 1), (tested, tested)).into_owned()) as f64;
-    left -= explaining;
-    if explaining < 1.0 || left < explaining {
-        return None;
+}
+
+/// What a fit leaves and columns that are tested, everything else that is fitted and the other columns at their best.
+#[derive(Debug, Clone)]
+pub struct Left {
+    residual: DVector<f64>,
+    tested: DMatrix<f64>,
+    /// Numbers less what is fitted to them without the tested columns.
+    freedom: f64,
+    /// The numbers of each pose.
+    poses: Vec<Range<usize>>,
+}
+
+impl Left {
+    /// Of the first `tested` of these columns of each placement.
+    pub fn new(linear: &Linearised, tested: usize, columns: impl Fn(&Placement) -> DMatrix<f64>) -> Option<Left> {
+        let (mut parts, mut poses, mut freedom, mut start) = (Vec::new(), Vec::new(), 0.0, 0);
+        for placement in &linear.placements {
+            let (fresh, of_placement) = (columns(placement), &placement.linear);
+            let count = placement.poses.len();
+            let all = DMatrix::from_fn(count, 1 + fresh.ncols() + linear.shared, |r, c| match c {
+                0 => placement.at_zero[r],
+                _ if c <= fresh.ncols() => fresh[(r, c - 1)],
+                _ => of_placement.jacobian[(r, c - 1 - fresh.ncols())],
+            });
+            parts.push(without(&all, &of_placement.design));
+            poses.extend(placement.by_pose().map(|(_, at)| start + at.start..start + at.end));
+            freedom += (count - of_placement.design.ncols()) as f64;
+            start += count;
+        }
+        let kept = 1 + tested;
+        let mut all = DMatrix::zeros(start, parts.first()?.ncols());
+        let mut at = 0;
+        for part in parts {
+            all.rows_mut(at, part.nrows()).copy_from(&part);
+            at += part.nrows();
+        }
+        let others = all.columns(kept, all.ncols() - kept).into_owned();
+        freedom -= rank(&product(&others, &others)) as f64;
+        let left = without(&all.columns(0, kept).into_owned(), &others);
+        let residual = left.column(0).into_owned();
+        Some(Left { residual, tested: left.columns(1, tested).into_owned(), freedom, poses })
     }
-    let Eliminated { normal: of_residual, follow, inverse } = Eliminated::new(&normal, 1);
-    let (whole, unexplained) = (normal[(0, 0)], of_residual[(0, 0)]);
-    let scatter = unexplained / left;
-    let law = FisherSnedecor::new(explaining, left).ok().filter(|_| scatter > 0.0)?;
-    Some(Explained {
-        share: (whole - unexplained - explaining * scatter) / whole,
-        chance: law.sf((whole - unexplained) / explaining / scatter),
-        factors: -follow.column(0),
-        sds: inverse.diagonal().map(|variance| (variance * scatter).sqrt()),
-    })
+
+    /// What the columns explain. `None` where too little is left to tell: with fewer numbers left than the columns take,
+    /// little would be noticed, and of points that were computed nothing is left at all.
+    pub fn explained(&self) -> Option<Explained> {
+        let normal = product(&self.tested, &self.tested);
+        let explaining = rank(&normal) as f64;
+        let left = self.freedom - explaining;
+        if explaining < 1.0 || left < explaining {
+            return None;
+        }
+        let inverse = pseudo_inverse(normal);
+        let factors = -&inverse * self.tested.tr_mul(&self.residual);
+        let whole = self.residual.norm_squared();
+        let unexplained = (&self.residual + &self.tested * &factors).norm_squared();
+        let scatter = unexplained / left;
+        let law = FisherSnedecor::new(explaining, left).ok().filter(|_| scatter > 0.0)?;
+        Some(Explained {
+            share: (whole - unexplained - explaining * scatter) / whole,
+            chance: law.sf((whole - unexplained) / explaining / scatter),
+            factors,
+            sds: inverse.diagonal().map(|variance| (variance * scatter).sqrt()),
+        })
+    }
 }
 
 /// Whether enough is left of a fit to tell, and it follows no joint.
@@ -72,7 +127,8 @@ pub fn is_scatter(formulation: &Formulation, set: &Dataset) -> bool {
     let linear = Linearised::new(&formulation.rows, &formulation.offsets_of());
     let numbers = linear.placements.iter().flat_map(Placement::by_pose).map(|(_, at)| at.len()).max().unwrap_or(0);
     let count = 2 * set.joint_count() * numbers;
-    explained(&linear, count, |placement| columns(placement, formulation, set, count))
+    Left::new(&linear, count, |placement| columns(placement, formulation, set, count))
+        .and_then(|left| left.explained())
         .is_some_and(|explained| explained.chance > FALSE_ALARM)
 }
 
@@ -91,17 +147,6 @@ fn columns(placement: &Placement, formulation: &Formulation, set: &Dataset, coun
         }
     }
     columns
-}
-
-/// Product of [residual, fresh columns, shared unknowns] with itself, the placement's own unknowns eliminated.
-fn eliminated(placement: &Placement, fresh: &DMatrix<f64>, shared: usize) -> DMatrix<f64> {
-    let all: Vec<usize> = (0..placement.poses.len()).collect();
-    let normal = placement.normal(&all, Some(fresh));
-    let of_fresh = shared + 1 + placement.linear.design.ncols()..normal.nrows();
-    let order: Vec<usize> =
-        iter::once(shared).chain(of_fresh.clone()).chain(0..shared).chain(shared + 1..of_fresh.start).collect();
-    let normal = DMatrix::from_fn(order.len(), order.len(), |r, c| normal[(order[r], order[c])]);
-    Eliminated::new(&normal, 1 + fresh.ncols() + shared).normal
 }
 
 #[cfg(test)]

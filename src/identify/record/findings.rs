@@ -257,13 +257,12 @@ fn of_data(set: &Dataset, found: &Identification) -> Vec<Finding> {
         let finding = "poses that the robot came back to: they say how well it repeats, and nothing about its links";
         add(finding.to_owned(), names, "all of them are used");
     }
+    let rows = if found.outliers.is_empty() { "all rows" } else { "all rows that were fitted" };
     let constant = match &constant_joints(set, &found.outliers)[..] {
         [] => None,
-        [one] => {
-            Some(format!("joint {one} is the same in all rows: its parameters cannot be told from its neighbours'"))
-        }
+        [one] => Some(format!("joint {one} is the same in {rows}: its parameters cannot be told from its neighbours'")),
         all => Some(format!(
-            "joints {} are the same in all rows: their parameters cannot be told from their neighbours'",
+            "joints {} are the same in {rows}: their parameters cannot be told from their neighbours'",
             all.join(", ")
         )),
     };

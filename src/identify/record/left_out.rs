@@ -1,13 +1,15 @@
 //! Rows that were left out because of what a joint did in them: they are the ones that tell of it, and no gross errors.
 //!
 //! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the
-//! joint, and the finding. Method: three looks. Rows in which a joint is not where it is in most of them, and rows that
+//! joint, and the finding. Method: four looks. A column that stands some rows off in them. Rows in which a joint is not where it is in most of them, and rows that
 //! fill a part of its range: how likely it is that so many of them are among those left out by chance (the
 //! hypergeometric distribution). Errors along which a joint moves the target: gross errors go anywhere, so that the
 //! cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's
 //! method). A joint that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque
 //! about it; else both are named. Each times the joints and ways that were looked at. Goes wrong: a joint that moves in
 //! every row; few rows whose errors share a direction in the sensor's frame, which is then no joint's.
+
+mod shifted_column;
 
 use nalgebra::{Matrix3, Vector3};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -52,8 +54,9 @@ pub fn of_a_joint(
     let first = |look: &dyn Fn(usize) -> Option<(f64, Finding)>| {
         (0..joints).filter_map(look).min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, finding)| finding)
     };
-    let moving = first(&|joint| moves(&rows, joint));
-    moving.or_else(|| first(&|joint| within(&rows, joint))).or_else(|| along(&rows, errors))
+    let shifted = shifted_column::find(set, outliers, errors).map(|(joint, by)| shifted(&rows, joint, by));
+    let moving = || first(&|joint| moves(&rows, joint));
+    shifted.or_else(moving).or_else(|| first(&|joint| within(&rows, joint))).or_else(|| along(&rows, errors))
 }
 
 /// The rows that were fitted and those that were left out.
@@ -127,6 +130,21 @@ impl Rows<'_> {
     fn are_many(&self, rows: usize) -> bool {
         rows > 0 && rows as f64 >= MANY * (self.fitted.len() + self.outliers.len()) as f64
     }
+}
+
+/// A joint's readings stand so many rows further down, in the rows that were left out.
+fn shifted(of: &Rows, joint: usize, by: isize) -> Finding {
+    let count = by.unsigned_abs();
+    let said = format!(
+        "{} of {} rows were left out, and would fit if the column of joint {} stood {count} {} further {} in them: cells of it were lost, or are \
+         there twice",
+        of.outliers.len(),
+        of.fitted.len() + of.outliers.len(),
+        joint + 1,
+        if count == 1 { "row" } else { "rows" },
+        if by > 0 { "up" } else { "down" },
+    );
+    finding(of.set, said, joint, of.outliers.to_vec())
 }
 
 /// Where a joint stands in most rows, the rows in which it does not are left out.

@@ -28,6 +28,8 @@ const MOST_FILE_BYTES: u64 = MOST_DECODED_BYTES + (64 << 20);
 const MOST_HELD_BYTES: u64 = 3 << 30;
 /// More pictures than any series: a chain that leads back into itself ends here.
 const MOST_PAGES: usize = 10_000;
+/// How the text begins that Git LFS leaves in the place of a file which was not fetched.
+const LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
 /// In the tag of what a picture is to the others, the bit of a smaller copy (TIFF 6.0, NewSubfileType).
 const SMALLER: u32 = 1;
 
@@ -58,7 +60,12 @@ pub fn header(path: &Utf8Path) -> Result<Header, String> {
             mib(MOST_FILE_BYTES)
         ));
     }
-    let file = BufReader::new(File::open(path).map_err(unreadable)?);
+    let mut file = BufReader::new(File::open(path).map_err(unreadable)?);
+    if file.fill_buf().map_err(unreadable)?.starts_with(LFS_POINTER) {
+        return Err(format!(
+            "is a Git LFS pointer of {file_bytes} bytes, no picture: `git lfs pull` fetches the picture"
+        ));
+    }
     let mut reader = ImageReader::new(file).with_guessed_format().map_err(unreadable)?;
     if reader.format().is_none()
         && let Ok(format) = ImageFormat::from_path(path)
@@ -187,6 +194,15 @@ mod tests {
     use tiff::encoder::{TiffEncoder, colortype::Gray8};
 
     use super::*;
+
+    #[test]
+    fn a_picture_that_git_did_not_fetch_is_named() {
+        let pointer =
+            format!("version https://git-lfs.github.com/spec/v1\noid sha256:{}\nsize 12345\n", "4d7a".repeat(16));
+        let (_keep, path) = crate::files::temporary("a.png", &pointer);
+        let said = header(&path).unwrap_err();
+        assert!(said.contains("Git LFS pointer") && !said.contains(UNDECODABLE), "{said}");
+    }
 
     #[test]
     fn pictures_of_a_series_count_and_smaller_copies_do_not() {

@@ -49,16 +49,16 @@ impl Line {
     /// F of a pattern: what it gains over the pairs' scatter with it taken out, and the degrees of freedom of that
     /// scatter. Zero where the pairs do not determine it.
     pub fn f(&self, pattern: &DVector<f64>) -> (f64, f64) {
-        let n = pattern.len();
         let columns: Vec<&DVector<f64>> = std::iter::once(pattern).chain(&self.places).collect();
-        let freedom = (n as f64 - 1.0 - columns.len() as f64).max(1.0);
+        let freedom = |told: usize| (told as f64 - 1.0 - columns.len() as f64).max(1.0);
         let turned: Vec<DVector<f64>> = columns.iter().map(|c| &self.form * *c).collect();
         let matrix = DMatrix::from_fn(columns.len(), columns.len(), |a, b| columns[a].dot(&turned[b]));
         let right = DVector::from_fn(columns.len(), |a, _| -columns[a].dot(&self.gradient));
-        let Some(inverse) = invert(&matrix) else { return (0.0, freedom) };
+        let Some(inverse) = invert(&matrix) else { return (0.0, freedom(pattern.len())) };
         let amounts = &inverse * right;
         let left = turned.iter().zip(amounts.iter()).fold(self.gradient.clone(), |left, (t, a)| left + t * *a);
-        let squares: f64 = left.iter().zip(&self.own).map(|(l, own)| l * l / own.max(f64::MIN_POSITIVE)).sum();
+        let (squares, told) = squares(left.iter().copied().zip(self.own.iter().copied()));
+        let freedom = freedom(told);
         let f = amounts[0].powi(2) / inverse[(0, 0)] / (squares / freedom).max(1.0);
         (if f.is_finite() { f } else { 0.0 }, freedom)
     }
@@ -208,17 +208,29 @@ impl Linear {
         amounts: &DVector<f64>,
     ) -> f64 {
         let own = directions.iter().zip(amounts.iter()).fold(common * 0.0, |sum, (d, a)| sum + d * *a);
-        let mut squares = 0.0;
-        for (i, x) in pattern.iter().enumerate() {
-            let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - common);
-            for direction in directions {
-                let information = direction.dot(&(&self.matrices[i] * direction));
-                squares += direction.dot(&left).powi(2) / information.max(f64::MIN_POSITIVE);
-            }
+        let (mut sum, mut freedom) = (0.0, 0);
+        for direction in directions {
+            let of_pair = |(i, x): (usize, &f64)| {
+                let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - common);
+                (direction.dot(&left), direction.dot(&(&self.matrices[i] * direction)))
+            };
+            let (squares, told) = squares(pattern.iter().enumerate().map(of_pair));
+            sum += squares;
+            freedom += told.saturating_sub(2);
         }
-        let freedom = (directions.len() * self.pairs().saturating_sub(2)).max(1) as f64;
-        squares / freedom
+        sum / freedom.max(1) as f64
     }
+}
+
+/// Squares of what pairs leave along a direction, each by its information on it, and how many of them tell it.
+fn squares(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, usize) {
+    /// Share of the information of the pair that tells most below which a pair, such as of one picture, tells nothing:
+    /// what is left there is rounding.
+    const TELLS: f64 = 1e-9;
+    let pairs: Vec<(f64, f64)> = pairs.collect();
+    let most = pairs.iter().map(|(_, information)| *information).fold(f64::MIN_POSITIVE, f64::max);
+    let telling = || pairs.iter().filter(|(_, information)| *information > TELLS * most);
+    (telling().map(|(left, information)| left * left / information).sum(), telling().count())
 }
 
 #[cfg(test)]
@@ -226,9 +238,33 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::imaging::Side;
     use crate::stereo::calibrate::calibrate;
     use crate::stereo::findings::hypothesis::turned;
     use crate::stereo::synthetic::{BROWN4, World};
+
+    /// What such a pair leaves along a turn of the right camera is rounding.
+    #[test]
+    fn a_pair_of_one_picture_says_nothing_of_the_rig() {
+        let world = World { sigma_px: 0.01, ..World::new(10, 31) };
+        let mut corners = world.corners(31);
+        let after = world.with_camera_moved(Vector3::y() * 1e-4, Vector3::zeros()).corners(31);
+        (5..10).for_each(|i| corners.pairs[i] = after.pairs[i].clone());
+        let found = calibrate(&corners, &BROWN4).unwrap();
+        let (all, layout) = (found.problem(), found.layout);
+        let mut without = all.clone();
+        without.views[2].observations.retain(|o| o.side == Side::Left);
+        without.values = without.refit(&layout).unwrap();
+        let yaw = turned(&layout, found.rig(), Vector3::y());
+        let pattern = DVector::from_fn(10, |i, _| f64::from(i >= 5));
+        let [(change, f), (of_all, f_of_all)] = [without, all].map(|problem| {
+            let linear = Linear::new(&problem, &layout).unwrap();
+            let change = linear.change(std::slice::from_ref(&yaw), pattern.as_slice()).unwrap();
+            (change, linear.line(&yaw).f(&pattern).0)
+        });
+        assert!(change.scatter < 2.0 * of_all.scatter, "{change:?} {of_all:?}");
+        assert!(f > 0.3 * f_of_all && f_of_all > 10.0, "{f} {f_of_all}");
+    }
 
     /// A pair that is left out in the linear problem is as one that was not there.
     #[test]

@@ -1,5 +1,7 @@
 //! Which numbers of a rig are free, where each stands in the vector of unknowns, and how a step changes them.
 
+use nalgebra::DVector;
+
 use crate::geometry::{Transform, perturb};
 use crate::imaging::Side;
 use crate::stereo::model::board_shape;
@@ -118,6 +120,19 @@ impl Layout {
             numbers.extend(shared.shape_mm);
         }
         numbers
+    }
+
+    /// The step from one to the other, in the coordinates of the covariance.
+    pub fn between(&self, from: &Shared, to: &Shared) -> DVector<f64> {
+        let (from_numbers, to_numbers) = (self.numbers(from), self.numbers(to));
+        let mut step =
+            DVector::from_iterator(self.count(), to_numbers.iter().zip(&from_numbers).map(|(to, from)| to - from));
+        if self.transform {
+            // A rotation's covariance is that of the small turn on its left.
+            let turn = to.rig.right_from_left.rotation * from.rig.right_from_left.rotation.inverse();
+            step.rows_mut(self.transform_start(), 3).copy_from(&turn.scaled_axis());
+        }
+        step
     }
 
     /// Applies a step; `step` is as long as [`Layout::count`].

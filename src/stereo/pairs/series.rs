@@ -186,12 +186,12 @@ fn check(
         let is_rig = !none || members.iter().filter(|&&i| fits(i)).count() >= candidates.fewest_pairs;
         let is_told = |pair: &&DiscardedPair| is_rig || matches!(pair.cause, Cause::Duplicate | Cause::Misread);
         let mut bad: Vec<Skipped> = discarded.iter().filter(is_told).map(DiscardedPair::skipped).collect();
-        let agreeing = if none { 0 } else { members.len() };
+        let agreeing = if none { (0..total).filter(|i| fits(*i)).count() } else { members.len() };
         if none {
             let missed = |i: usize| {
                 let reason = match fits(i) {
-                    true => "fits a rig that the others do not fit".to_owned(),
-                    false => format!("misses the rig of all by {:.1} px", missed_px(i)),
+                    true => "on that rig".to_owned(),
+                    false => format!("{:.1} px off the rig of all", missed_px(i)),
                 };
                 Skipped { pair: candidates.views[i].pair.clone(), reason }
             };

@@ -31,7 +31,7 @@ use crate::stereo::model::rig::Rig;
 use crate::stereo::model::{KnownLenses, Layout, Shared, Values};
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
-use crate::stereo::select::stated_uncertainty::{scatter_beside, step};
+use crate::stereo::select::stated_uncertainty::scatter_beside;
 use crate::stereo::solve::normal_equations;
 use crate::stereo::solve::uncertainty;
 use crate::stereo::solve::{Priors, Problem, Solved};
@@ -100,7 +100,7 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let numbers = layout.shape_start();
     let old = before.covariance(&layout).ok_or(Error::NoCovariance)?;
     let joint = old + trial.covariance.view((0, 0), (numbers, numbers)) * scatter;
-    let off = step(&layout, &problem.values.shared, &trial.values.shared).rows(0, numbers).into_owned();
+    let off = layout.between(&problem.values.shared, &trial.values.shared).rows(0, numbers).into_owned();
     let pairs = before.pairs.unwrap_or(0).max(problem.views.len());
     let difference = Difference::new(off, &joint, pairs, beyond).ok_or_else(Error::undetermined)?;
     let from_old = step_from_old(&solved, &problem.values, &layout).and_then(|(off, covariance)| {

@@ -167,27 +167,16 @@ fn step_to_witness(layout: &Layout, chosen: &Shared, richer: &Shared, problem: &
         if is_other { nearest_lens::describe(camera, like, places) } else { None }
     };
     let (Some(left), Some(right)) = (describe(Side::Left), describe(Side::Right)) else {
-        return step(layout, chosen, richer);
+        return layout.between(chosen, richer);
     };
     let mut described = richer.clone();
     let turned = |turn: UnitQuaternion<f64>| Transform::from_parts(Translation3::identity(), turn);
     described.rig.right_from_left =
         turned(right.own_from_camera) * richer.rig.right_from_left * turned(left.own_from_camera.inverse());
-    let mut step = step(layout, chosen, &described);
+    let mut step = layout.between(chosen, &described);
     for (side, camera) in [(Side::Left, left), (Side::Right, right)] {
         step.rows_mut(layout.camera_start(side), camera.step.len()).copy_from(&camera.step);
     }
-    step
-}
-
-/// From one model's shared numbers to those of a richer one, in the coordinates of the covariance.
-pub fn step(layout: &Layout, from: &Shared, to: &Shared) -> DVector<f64> {
-    let (from_numbers, to_numbers) = (layout.numbers(from), layout.numbers(to));
-    let mut step =
-        DVector::from_iterator(layout.count(), to_numbers.iter().zip(&from_numbers).map(|(to, from)| to - from));
-    // A rotation's covariance is that of the small turn on its left.
-    let turn = to.rig.right_from_left.rotation * from.rig.right_from_left.rotation.inverse();
-    step.rows_mut(layout.transform_start(), 3).copy_from(&turn.scaled_axis());
     step
 }
 

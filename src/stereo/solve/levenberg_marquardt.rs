@@ -156,12 +156,18 @@ fn attempt(
 ) -> Option<Attempt> {
     let (values, predicted_gain) = try_step(layout, values, equations, damping)?;
     let mut reached = Attempt { equations: of(&values), values, predicted_gain };
-    if let Some(there) = reached.equations.as_ref().filter(|there| cost - there.cost() < FORETOLD * predicted_gain) {
-        // What bends is mostly the poses' part in it: they follow the shared numbers by a step of their own.
+    if let Some(there) = reached.equations.as_mut().filter(|there| cost - there.cost() < FORETOLD * predicted_gain) {
+        // What bends is mostly the poses' part in it: they follow the shared numbers by a step of their own, each where
+        // that is nearer, for the pose of a pair whose corners contradict each other jumps.
         let followed = with_poses_following(&reached.values, there);
         let then = followed.as_ref().and_then(of);
-        if let Some((values, then)) = followed.zip(then).filter(|(_, then)| then.cost() < there.cost()) {
-            reached = Attempt { values, equations: Some(then), predicted_gain };
+        if let Some((followed, then)) = followed.zip(then) {
+            let own = reached.values.poses.iter_mut().zip(&mut there.blocks);
+            for ((pose, block), (follows, then)) in own.zip(followed.poses.into_iter().zip(then.blocks)) {
+                if then.cost < block.cost {
+                    (*pose, *block) = (follows, then);
+                }
+            }
         }
     }
     Some(reached)

@@ -6,7 +6,6 @@ use crate::stereo::board_pose::pair_excess::pair_excess;
 use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::Cause;
 use crate::stereo::select::known_lenses::LensCheck;
-use crate::stereo::select::stated_uncertainty::step;
 use crate::stereo::{Camera, Error, Side};
 
 /// Another day's pictures of the same rig.
@@ -154,7 +153,7 @@ fn off(found: &Calibration, world: &World, stated: &DMatrix<f64>) -> f64 {
     let at = found.layout.transform_start();
     let mut shared = found.values.shared.clone();
     shared.rig.right_from_left = world.rig.right_from_left;
-    let step = step(&found.layout, &found.values.shared, &shared).rows(at, 6).into_owned();
+    let step = found.layout.between(&found.values.shared, &shared).rows(at, 6).into_owned();
     let stated = stated.view((at, at), (6, 6)).into_owned();
     step.dot(&stated.cholesky().unwrap().solve(&step)) / 6.0
 }

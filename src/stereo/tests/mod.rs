@@ -18,7 +18,6 @@ use crate::stereo::judge::ledger::Standards;
 use crate::stereo::judge::lengths::held_out;
 use crate::stereo::model::Shared;
 use crate::stereo::select::options::Options;
-use crate::stereo::select::stated_uncertainty;
 use crate::stereo::synthetic::{self, BROWN4, World};
 
 fn judged(corners: &Corners, options: &Options, tolerance_mm: f64) -> Judged {
@@ -33,5 +32,5 @@ fn covariance_of(calibration: &Calibration, names: &[&str]) -> DMatrix<f64> {
 /// Deviations of the shared numbers from the truth, in the coordinates of the covariance.
 fn deviations(calibration: &Calibration, world: &World) -> DVector<f64> {
     let truth = Shared { rig: world.rig.clone(), shape_mm: [world.bow_mm[0], world.bow_mm[1], world.twist_mm] };
-    stated_uncertainty::step(&calibration.layout, &truth, &calibration.values.shared)
+    calibration.layout.between(&truth, &calibration.values.shared)
 }

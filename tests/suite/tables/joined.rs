@@ -47,8 +47,8 @@ fn rows_are_joined_by_their_names() {
         // Rows of which the other file has none.
         let lost = |skipped: &'static [usize]| (0..30).filter(|i| !skipped.contains(i));
         for (first, second, says) in [
-            (&[][..], &[4, 17][..], vec!["left out of q.csv, as the other file has no such row: 5, 18"]),
-            (&[4], &[], vec!["left out of p.csv, as the other file has no such row: 5"]),
+            (&[][..], &[4, 17][..], ["left out of q.csv: `", "` 5, 18, which the other file does not have"]),
+            (&[4], &[], ["left out of p.csv: `", "` 5, which the other file does not have"]),
         ] {
             let [q, p] = tables(&folder, &rows, &numbered(lost(first), ""), &numbered(lost(second), ""), head);
             let (found, said) = source(&[&q, &p]).read(&robot).unwrap_or_else(|e| panic!("{}", report(&e)));

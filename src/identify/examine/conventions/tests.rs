@@ -318,6 +318,12 @@ fn several_joints_that_are_counted_otherwise_at_once_are_named() {
         let said = said(&wrong, &world.nominal);
         assert!(said.len() == 1 && words.iter().all(|word| said[0].contains(word)), "{words:?}: {said:?}");
     }
+    // What a twist of the wrong sign does as well is named beside it.
+    for pair in [[1, 2], [4, 5]] {
+        let said = said(&joints(&rows, |q| negated(q, &pair)), &world.nominal);
+        let words = format!("joints {}, {} are counted the other way round", pair[0] + 1, pair[1] + 1);
+        assert!(said.len() == 1 && said[0].contains(&words), "{said:?}");
+    }
     // Of a joint that hardly moves the target nothing is said.
     let (world, rows) = near_the_axis(0.02);
     let said = said(&joints(&rows, |q| negated(q, &[2, 4])), &world.nominal);
