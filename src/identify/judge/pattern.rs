@@ -81,7 +81,7 @@ impl Left {
             });
             parts.push(without(&all, &of_placement.design));
             poses.extend(placement.by_pose().map(|(_, at)| start + at.start..start + at.end));
-            freedom += (count - of_placement.design.ncols()) as f64;
+            freedom += count as f64 - of_placement.design.ncols() as f64;
             start += count;
         }
         let kept = 1 + tested;
