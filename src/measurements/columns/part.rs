@@ -82,6 +82,7 @@ impl Part {
         let mut meanings: Option<Vec<Name>> = headed.names.as_ref().map(|names| understood(names));
         if let Some(meanings) = &mut meanings {
             target_as_name(meanings, &headed.rows);
+            without_blank_points(meanings, &headed.rows);
         }
         if let Form::Program { degrees, .. } = grid.form {
             meanings = Some((0..width).map(|column| of_program(column, joints, degrees)).collect());
@@ -275,6 +276,18 @@ fn target_as_name(meanings: &mut [Name], rows: &[(u64, Fields)]) {
         rows.iter().map(|(_, row)| row[column].trim()).filter(|cell| !cell.is_empty()).collect();
     if cells.len() == rows.len() {
         meanings[column].what = What::Own("pose");
+    }
+}
+
+/// Columns of a point that nobody filled in, beside those of one that was, are none of a point.
+fn without_blank_points(meanings: &mut [Name], rows: &[(u64, Fields)]) {
+    let is_nothing = |cell: &str| NOTHING.contains(&cell.trim().to_lowercase().as_str());
+    let is_blank = |column: usize| rows.iter().all(|(_, row)| is_nothing(&row[column]));
+    let points: Vec<usize> =
+        (0..meanings.len()).filter(|&column| matches!(meanings[column].what, What::Coordinate(_))).collect();
+    let (blank, filled): (Vec<usize>, Vec<usize>) = points.into_iter().partition(|&column| is_blank(column));
+    if !filled.is_empty() {
+        blank.into_iter().for_each(|column| meanings[column].what = What::Other);
     }
 }
 

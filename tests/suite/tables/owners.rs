@@ -34,6 +34,22 @@ fn names_of_two_words_between_blanks_are_one_name_and_columns_help_where_names_d
     same(&named.read(&robot).expect("named").0, &rows, "named");
 }
 
+#[test]
+fn a_point_that_nobody_filled_in_is_none() {
+    let folder = Folder(workplace());
+    let (robot, rows) = world(30);
+    for (name, blank) in [("empty.csv", ",,"), ("nan.csv", "nan,nan,nan")] {
+        let mut table = "q1,q2,q3,q4,q5,q6,x1,y1,z1,xb,yb,zb\n".to_owned();
+        for (q, [x, y, z]) in &rows {
+            let joints: Vec<String> = q.iter().map(f64::to_string).collect();
+            let _ = writeln!(table, "{},{x},{y},{z},{blank}", joints.join(","));
+        }
+        let (found, said) = source(&[&folder.file(name, table)]).read(&robot).expect("one point");
+        same(&found, &rows, name);
+        assert!(!said[0].contains("xb to zb") && !said[0].contains("targets"), "{said:?}");
+    }
+}
+
 /// Rows of one reflector each, in turn, their distances from the first one times `size`.
 fn in_turn(rows: &Rows, size: f64) -> Vec<(usize, [f64; 3])> {
     let all = of_reflectors(rows);
