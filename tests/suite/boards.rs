@@ -177,8 +177,11 @@ fn a_board_is_counted_measured_and_read_from_files() {
         assert_eq!(corners(), known);
     }
     // A print that is half a percent large: lengths follow, and the caliper's uncertainty is in the verdict.
-    let (_, said) = check(folder.path(), &["--measured-mm", "201.0x201.0"]);
-    assert!(said.contains("squares of 10.05 mm, not 10 mm") && said.contains("20x20 squares of 10.05"), "{said}");
+    // Of a size that nobody gave nothing is said.
+    for (given, words) in [(&["--square-mm", "10"][..], "10.05 mm, not 10 mm; by"), (&[], "10.05 mm; by a caliper")] {
+        let (_, said) = check(folder.path(), &[&["--measured-mm", "201.0x201.0"], given].concat());
+        assert!(said.contains(&format!("squares of {words}")) && said.contains("20x20 squares of 10.05"), "{said}");
+    }
     let text = std::fs::read_to_string(folder.path().join("out/camera-check.json")).unwrap();
     assert!(text.contains("10.05"), "{text}");
     for (extent, why) in [("180x180", "inner corners"), ("210x210", "+5.0 %")] {
