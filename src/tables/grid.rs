@@ -10,9 +10,8 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::called;
 use super::cells;
 use super::fields::{Fields, Form};
-use super::log_lines;
+use super::lines::{log, program};
 use super::numbers::Style;
-use super::program_lines;
 use super::source::{self, Source};
 use crate::files::{Error, Result};
 use crate::programs::Language;
@@ -81,11 +80,11 @@ impl Grid {
             }
             Source::Records(rows) => Ok(Grid { rows, ..empty(Form::Named("records of JSON", 0), None) }),
             Source::Text(text, encoding) => {
-                let logged = joints.filter(|_| Language::of(path).is_none()).and_then(|_| log_lines::read(&text));
+                let logged = joints.filter(|_| Language::of(path).is_none()).and_then(|_| log::read(&text));
                 if let Some((rows, others)) = logged {
                     return Ok(Grid { rows, ..empty(Form::Named("lists of a log", others), encoding) });
                 }
-                if let Some((rows, form)) = joints.and_then(|joints| program_lines::read(path, &text, joints)) {
+                if let Some((rows, form)) = joints.and_then(|joints| program::read(path, &text, joints)) {
                     let grid = Grid { rows, ..empty(form, encoding) };
                     if let Form::Program { calls, .. } = &grid.form
                         && calls.len() > 1

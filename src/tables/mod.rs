@@ -5,8 +5,7 @@
 //!  foreign  what is no table: which program's file it is, and how to export it
 //!  grid     text -> rows of cells: which delimiter, decimal comma, lines of a program; line numbers as an editor counts them
 //!  cells    a unit, a list, a name or a comment beside the number of a cell
-//!  records  objects of JSON -> rows of cells
-//!  log_lines   lines of a log that name their values -> rows of cells
+//!  lines    lines of a log or of a program, objects of JSON -> rows of cells
 //!  called   joints whose names stand in cells -> names of their columns
 //!  numbers  a cell with a decimal comma, or with thousands set apart, as a number
 //!  expression   a cell with a formula, `pi/2`, `q2 - 90`, as a number
@@ -21,11 +20,9 @@ mod fields;
 mod foreign;
 pub mod grid;
 pub mod header;
-mod log_lines;
+mod lines;
 pub mod names;
 mod numbers;
-mod program_lines;
-mod records;
 mod source;
 pub mod vocabulary;
 

@@ -13,8 +13,8 @@ use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 use super::fields::Fields;
 use super::foreign;
+use super::lines::records;
 use super::numbers::Style;
-use super::records;
 use crate::files::{Error, Result, unreadable};
 
 /// The longest table that is read, bytes.

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 
 use serde_json::{Deserializer, Map, Value};
 
-use super::cells;
-use super::fields::Fields;
+use crate::tables::Fields;
+use crate::tables::cells;
 
 type Record = Map<String, Value>;
 
@@ -21,7 +21,7 @@ const NUMBERS: usize = 3;
 const SPARSE: usize = 4;
 
 /// The names, and below them the records with their lines.
-pub(super) fn read(text: &str) -> Option<Vec<(u64, Fields)>> {
+pub fn read(text: &str) -> Option<Vec<(u64, Fields)>> {
     let (mut places, mut names): (BTreeMap<String, usize>, Vec<String>) = (BTreeMap::new(), Vec::new());
     let mut rows: Vec<(u64, Vec<(usize, String)>)> = Vec::new();
     for (line, record) in records(text)? {

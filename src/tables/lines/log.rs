@@ -5,10 +5,10 @@
 //! and between them is left alone, as are lines without a list. What goes wrong: other names somewhere, or in another
 //! order, and names that are of no more than one list, as in the calls of a program, make it no such log.
 
-use super::cells::list;
-use super::fields::Fields;
-use super::names::{Name, What};
-use super::numbers::is_number;
+use crate::tables::Fields;
+use crate::tables::cells::list;
+use crate::tables::names::{Name, What};
+use crate::tables::numbers::is_number;
 
 /// Rows from which on a text is a log.
 const ROWS: usize = 3;
@@ -20,7 +20,7 @@ const MOST_VALUES: usize = 40;
 const LONGEST: usize = 1000;
 
 /// The names, and below them the rows with the lines in which they begin; and how many lines hold no list.
-pub(super) fn read(text: &str) -> Option<(Vec<(u64, Fields)>, usize)> {
+pub fn read(text: &str) -> Option<(Vec<(u64, Fields)>, usize)> {
     let mut rows: Vec<(u64, Vec<(&str, &str)>)> = Vec::new();
     let (mut lines, mut others) = (0, 0);
     let alike = |a: &[(&str, &str)], b: &[(&str, &str)]| a.iter().map(|v| v.0).eq(b.iter().map(|v| v.0));

@@ -11,14 +11,14 @@ use std::ops::Range;
 
 use camino::Utf8Path;
 
-use super::fields::{Fields, Form};
 use crate::programs::{self, Joints, Language};
+use crate::tables::{Fields, Form};
 
 /// Moves from which on a program may have more lines of other commands.
 const MOVES: usize = 5;
 
 /// The targets with their lines, and the form. `None` where the text is no program.
-pub(super) fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u64, Fields)>, Form)> {
+pub fn read(path: &Utf8Path, text: &str, joints: usize) -> Option<(Vec<(u64, Fields)>, Form)> {
     let lines = text.lines().filter(|line| !line.trim().is_empty()).count();
     if let Some(language) = Language::of(path) {
         let slides = vec![false; joints];
