@@ -77,10 +77,11 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         if is_open(&tried) {
             tried = explaining(Look::All);
         }
-        if now.fitted >= IMPLAUSIBLE_MM {
-            let several =
-                |look| self::explaining(&counting::likeliest(&set, &robot), &set, &robot, settings, &now, look);
-            tried = with_several(tried, || several(Look::All));
+        // Several faults of counting at once where none alone explains the errors, or where a twist does: two joints that
+        // are counted the other way round do the same.
+        if now.fitted >= IMPLAUSIBLE_MM && (!makes_plausible(&tried) || is_twist(&tried)) {
+            let several = counting::likeliest(&set, &robot);
+            with_several(&mut tried, &self::explaining(&several, &set, &robot, settings, &now, Look::All));
         }
         let best = Likeliest::of(&tried).filter(|best| cut.is_none_or(|cut| best.there.fitted < cut));
         let Some(best) = best else { break };
@@ -108,26 +109,19 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     Mended { set, robot, findings, against, open, unexplained_mm }
 }
 
-/// Hypotheses that were tried, and several faults of counting at once where none alone explains the errors, or where a
-/// twist does: two joints that are counted the other way round do the same.
-fn with_several(
-    mut tried: Vec<(Misfit, Hypothesis)>,
-    several: impl Fn() -> Vec<(Misfit, Hypothesis)>,
-) -> Vec<(Misfit, Hypothesis)> {
-    let alone = makes_plausible(&tried);
-    let is_twist = || Likeliest::of(&tried).is_some_and(|best| matches!(best.hypothesis, Hypothesis::Twisted(_)));
-    if alone && !is_twist() {
-        return tried;
+/// Adds several faults at once that explain the errors, in the place of what does not.
+fn with_several(tried: &mut Vec<(Misfit, Hypothesis)>, several: &[(Misfit, Hypothesis)]) {
+    if makes_plausible(several) {
+        if !makes_plausible(tried) {
+            tried.clear();
+        }
+        tried.extend(counting::without_untold(several));
     }
-    let several = several();
-    if !makes_plausible(&several) {
-        return tried;
-    }
-    if !alone {
-        tried.clear();
-    }
-    tried.extend(counting::without_untold(&several));
-    tried
+}
+
+/// Whether the likeliest is a twist of the wrong sign.
+fn is_twist(tried: &[(Misfit, Hypothesis)]) -> bool {
+    Likeliest::of(tried).is_some_and(|best| matches!(best.hypothesis, Hypothesis::Twisted(_)))
 }
 
 /// Whether none leaves what a built robot may leave, and nothing tells which of them it is.

@@ -1,9 +1,9 @@
 //! Rows that were left out because of what a joint did in them: they are the ones that tell of it, and no gross errors.
 //!
 //! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the
-//! joint, and the finding. Method: four looks. A column that stands some rows off in them. Rows in which a joint is not where it is in most of them, and rows that
-//! fill a part of its range: how likely it is that so many of them are among those left out by chance (the
-//! hypergeometric distribution). Errors along which a joint moves the target: gross errors go anywhere, so that the
+//! joint, and the finding. Method: four looks. A column that stands some rows off in them. Rows in which a joint is not
+//! where it is in most of them, and rows that fill a part of its range: how likely it is that so many of them are among
+//! those left out by chance (the hypergeometric distribution). Errors along which a joint moves the target: gross errors go anywhere, so that the
 //! cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's
 //! method). A joint that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque
 //! about it; else both are named. Each times the joints and ways that were looked at. Goes wrong: a joint that moves in
@@ -144,7 +144,8 @@ fn shifted(of: &Rows, joint: usize, by: isize) -> Finding {
         if count == 1 { "row" } else { "rows" },
         if by > 0 { "up" } else { "down" },
     );
-    finding(of.set, said, joint, of.outliers.to_vec())
+    Finding::new(said, format!("mend the column of joint {} from the first of them on", joint + 1))
+        .about(of.set.names(of.outliers))
 }
 
 /// Where a joint stands in most rows, the rows in which it does not are left out.

@@ -186,7 +186,7 @@ fn check(
         let is_rig = !none || members.iter().filter(|&&i| fits(i)).count() >= candidates.fewest_pairs;
         let is_told = |pair: &&DiscardedPair| is_rig || matches!(pair.cause, Cause::Duplicate | Cause::Misread);
         let mut bad: Vec<Skipped> = discarded.iter().filter(is_told).map(DiscardedPair::skipped).collect();
-        let agreeing = if none { (0..total).filter(|i| fits(*i)).count() } else { members.len() };
+        let mut agreeing = members.len();
         if none {
             let missed = |i: usize| {
                 let reason = match fits(i) {
@@ -197,6 +197,7 @@ fn check(
             };
             let is_open = |i: &usize| bad.iter().all(|told| told.pair != candidates.views[*i].pair);
             let open: Vec<usize> = (0..total).filter(is_open).collect();
+            agreeing = open.iter().filter(|i| fits(**i)).count();
             bad.extend(open.into_iter().map(missed));
             bad.sort_by(|a, b| a.pair.cmp(&b.pair));
         }
