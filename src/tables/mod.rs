@@ -11,6 +11,7 @@
 //!  expression   a cell with a formula, `pi/2`, `q2 - 90`, as a number
 //!  header   where the names of the columns stand, if there are any
 //!  names    a name -> a joint, a coordinate, a distance, its unit, and whether it was commanded
+//!  vocabulary   the words of such names, in the languages that tables have them in
 //! ```
 
 mod called;
