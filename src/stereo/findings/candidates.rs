@@ -8,12 +8,12 @@
 
 use nalgebra::DVector;
 
-use crate::difference::TOLD_APART;
-use crate::stereo::Side;
-use crate::stereo::calibrate::Calibration;
+use crate::difference::{Difference, TOLD_APART};
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place, centred, refocused};
-use crate::stereo::findings::series::{Change, Linear};
+use crate::stereo::findings::series::Change;
+use crate::stereo::model::Layout;
 use crate::stereo::pairs::Cause;
+use crate::stereo::{Rig, Side};
 
 enum What<'a> {
     One(&'a Hypothesis),
@@ -31,22 +31,21 @@ pub(super) struct Candidate<'a> {
 }
 
 impl<'a> Candidate<'a> {
-    /// All of them for a pattern over the pairs.
+    /// All of them for a change of which it is known what each cause takes of it; `pairs` tell that.
     pub fn all(
-        linear: &Linear,
+        change: &impl Fn(&[DVector<f64>]) -> Option<Change>,
+        pairs: usize,
         hypotheses: &'a [Hypothesis],
-        calibration: &Calibration,
-        by_pair: &[f64],
+        (layout, rig): (&Layout, &Rig),
         is_step: bool,
     ) -> Vec<Candidate<'a>> {
-        let (layout, rig) = (&calibration.layout, calibration.rig());
         let of = |what: What<'a>, directions: Vec<DVector<f64>>| {
-            Some(Candidate { change: linear.change(&directions, by_pair)?, what, directions })
+            Some(Candidate { change: change(&directions)?, what, directions })
         };
         let one = |h: &'a Hypothesis| of(What::One(h), vec![h.direction.clone()]);
         let mut all: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
         // Several numbers of a step need more pairs than they are; several that drift at once are no cause.
-        let tells = |numbers: usize| is_step && linear.pairs() > numbers + 2;
+        let tells = |numbers: usize| is_step && pairs > numbers + 2;
         let place = any_place(layout);
         if tells(place.len()) {
             all.extend(of(What::Elsewhere, place));
@@ -56,10 +55,10 @@ impl<'a> Candidate<'a> {
             let centre = centred(layout, side);
             let focus = refocused(layout, rig, &[side], 0.01);
             let refocused = of(What::Refocused(side), [&[focus][..], &centre].concat());
-            let moved = linear.change(&centre, by_pair);
+            let moved = change(&centre);
             // A picture that moved without a focus is no lens that was focused.
             let is_needed = |refocused: &Candidate| {
-                let cost = 0.5 * (linear.pairs() as f64).ln();
+                let cost = 0.5 * (pairs as f64).ln();
                 let gain = |moved: &Change| 0.5 * (refocused.change.gain - moved.gain) / scatter;
                 moved.as_ref().is_some_and(|moved| gain(moved) - cost > TOLD_APART)
             };
@@ -74,6 +73,11 @@ impl<'a> Candidate<'a> {
             What::Refocused(_) => Cause::Focus,
             What::Elsewhere => Cause::CameraMoved,
         }
+    }
+
+    /// What it leaves of a difference of two rigs.
+    pub fn left(&self, difference: &Difference) -> Option<f64> {
+        difference.left_by(&self.directions)
     }
 
     /// The change of the shared numbers, whole.
@@ -120,7 +124,9 @@ pub(super) fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -
         |c: &Candidate| 0.5 * c.change.gain / scatter - 0.5 * c.change.amounts.len() as f64 * (pairs as f64).ln();
     let top = candidates.iter().map(&evidence).fold(f64::NEG_INFINITY, f64::max);
     let mut equals: Vec<&Candidate> = candidates.iter().filter(|c| top - evidence(c) < TOLD_APART).collect();
-    equals.sort_by(|a, b| evidence(b).total_cmp(&evidence(a)));
+    // Causes that no pairs tell apart keep their order, however their sums are rounded.
+    let rounded = |c: &Candidate| (1e6 * evidence(c)).round();
+    equals.sort_by(|a, b| rounded(b).total_cmp(&rounded(a)));
     // A single number that does as well as several is what happened.
     if equals.iter().any(|c| matches!(c.what, What::One(_))) {
         equals.retain(|c| matches!(c.what, What::One(_)));

@@ -133,6 +133,11 @@ fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
     }
 }
 
+/// How far the pairs miss their rig.
+pub fn missed(calibration: &Calibration) -> Missed {
+    misfit_without(calibration, None).missed
+}
+
 /// How far the pairs miss the rig, each its own along a change where there is one.
 fn misfit_without(calibration: &Calibration, change: Option<Along>) -> Misfit {
     let (layout, views, shared) = (&calibration.layout, &calibration.views, &calibration.values.shared);

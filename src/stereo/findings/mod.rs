@@ -18,6 +18,7 @@ pub mod series;
 pub mod standing;
 #[cfg(test)]
 mod tests;
+mod two_rigs;
 mod without_drift;
 
 use nalgebra::DVector;
@@ -187,11 +188,23 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     let linear = Linear::new(&problem, &calibration.layout)?;
     let hypotheses = hypothesis::all(&calibration.layout, calibration.rig());
     let pattern = significant(&linear, &hypotheses)?;
-    let by_pair = pattern.by_pair.as_slice();
-    let candidates = Candidate::all(&linear, &hypotheses, calibration, by_pair, pattern.kind == Kind::Step);
+    let candidates = candidates(&linear, &hypotheses, calibration, &pattern, pattern.by_pair.as_slice());
     let equals = likeliest(&candidates, count);
     let other = without_one(&linear, &hypotheses, calibration, &pattern, &equals);
     finding(calibration, lengths, &equals, &pattern, other)
+}
+
+/// What may explain a pattern of these pairs.
+fn candidates<'a>(
+    linear: &Linear,
+    hypotheses: &'a [Hypothesis],
+    calibration: &Calibration,
+    pattern: &Pattern,
+    by_pair: &[f64],
+) -> Vec<Candidate<'a>> {
+    let change = |directions: &[DVector<f64>]| linear.change(directions, by_pair);
+    let of = (&calibration.layout, calibration.rig());
+    Candidate::all(&change, linear.pairs(), hypotheses, of, pattern.kind == Kind::Step)
 }
 
 /// What a change would be without one of the pairs.
@@ -213,7 +226,7 @@ fn without_one(
         let others = linear.without(pair)?;
         let shares = pattern.by_pair.iter().enumerate().filter(|(i, _)| *i != pair);
         let by_pair: Vec<f64> = shares.map(|(_, share)| *share).collect();
-        let candidates = Candidate::all(&others, hypotheses, calibration, &by_pair, pattern.kind == Kind::Step);
+        let candidates = candidates(&others, hypotheses, calibration, pattern, &by_pair);
         let now = likeliest(&candidates, others.pairs());
         let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
         let first = *causes.first()?;

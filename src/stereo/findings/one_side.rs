@@ -4,7 +4,8 @@
 //! picture the partner of another moment; a program mirrors or inverts what it saves of one camera. In: corners of
 //! pairs that contradict each other. Out: what, undone, makes most of the pairs fit one rig. Method: where pictures
 //! were lost is searched by the board's poses in single pictures; calibration tells whether the pairs that this leads
-//! to, or those of another change, fit one rig. Goes wrong: a camera that lost more than a few pictures.
+//! to, or those of another change, fit one rig; pictures that were changed are the cause where with that undone the
+//! pairs miss their rig by less than half as much. Goes wrong: a camera that lost more than a few pictures.
 
 use crate::geometry::Transform;
 use crate::imaging::input::pairs::natural_order;
@@ -12,6 +13,7 @@ use crate::imaging::{Corner, Corners, PairCorners, Side};
 use crate::stereo::Error;
 use crate::stereo::error::{OneSide, ShiftedFrom};
 use crate::stereo::model::KnownLenses;
+use crate::stereo::pairs::Missed;
 use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::mixups::mirror;
 use crate::stereo::pairs::shifts::{self, Partners};
@@ -19,38 +21,83 @@ use crate::stereo::pairs::shifts::{self, Partners};
 /// Share of the pairs that must fit one rig then.
 const MOST: f64 = 0.8;
 
+/// What becomes of pairs as a rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// Pairs that fit it.
+    pub pairs: usize,
+    /// How far these miss it.
+    pub missed: Missed,
+}
+
+impl Fit {
+    /// Whether most of the pairs fit.
+    fn is_of_most(&self, corners: &Corners) -> bool {
+        self.pairs as f64 >= MOST * corners.pairs.len() as f64
+    }
+}
+
+/// How far pairs that contradict each other miss the rig of all; `None` of another error.
+pub fn missed(error: &Error) -> Option<Missed> {
+    let Error::Contradiction { usual_px, alone_px, .. } = error else { return None };
+    Some(Missed { times: usual_px / alone_px.max(f64::MIN_POSITIVE) })
+}
+
 /// The error of pairs that contradict each other, or that of what happened to one side where that explains it. `known`
-/// are the lenses that are known; `fitting` counts the pairs that fit one rig.
+/// are the lenses that are known; `fitting` makes a rig of pairs.
 pub fn explain(
     error: Error,
     corners: &Corners,
     known: Option<&KnownLenses>,
-    fitting: impl Fn(&Corners) -> Option<usize>,
+    fitting: impl Fn(&Corners) -> Option<Fit>,
 ) -> Error {
-    if !matches!(error, Error::Contradiction { .. }) {
-        return error;
-    }
-    let enough = |changed: &Corners| {
-        let of = changed.pairs.len();
-        fitting(changed).filter(|fit| *fit as f64 >= MOST * of as f64).map(|fit| (fit, of))
-    };
+    let Some(missed) = missed(&error) else { return error };
     let series = Series::new(corners);
     let shifted = |partners: Vec<Partners>| {
         let first = partners.iter().find(|pair| pair.agree && pair.left != pair.right)?;
         let [left, right] = [first.left, first.right].map(|at| series.names[at].to_owned());
-        let (fit, of) = enough(&series.paired(&partners))?;
-        Some(Error::Shifted { fit, of, left, right, from: series.changes(&partners) })
+        let paired = series.paired(&partners);
+        let fit = fitting(&paired).filter(|fit| fit.is_of_most(&paired))?;
+        Some(Error::Shifted { fit: fit.pairs, of: paired.pairs.len(), left, right, from: series.changes(&partners) })
     };
-    let turns = || corners.board.turns_of_outline().into_iter();
-    let changed = |what: OneSide, quarters: usize| {
-        let (fit, of) = enough(&with_right(corners, what, quarters))?;
-        Some(Error::ChangedSide { what, fit, of })
+    let any = [OneSide::Mirrored, OneSide::Inverted];
+    shifted(series.by_poses(known)).or_else(|| changed(corners, &any, missed, fitting)).unwrap_or(error)
+}
+
+/// What may have been done to the pictures of one side of pairs that fit a rig badly: with it undone, the places of the
+/// right camera that single pictures give are apart by less than half as much.
+pub fn suspected(corners: &Corners, known: Option<&KnownLenses>) -> Vec<OneSide> {
+    let apart = |corners: &Corners, turns: &[usize]| Candidates::new(corners, known).ok()?.places_apart(turns);
+    let (open, all) = (corners.board.turns_left_open(), corners.board.turns_of_outline());
+    let as_they_are = apart(corners, &open).unwrap_or(0.0);
+    let undone = |what: &OneSide| match what {
+        OneSide::Mirrored => apart(&with_right(corners, *what, 0), &all),
+        OneSide::Inverted if all.len() > open.len() => apart(corners, &all),
+        OneSide::Inverted => None,
     };
-    let open = corners.board.turns_left_open();
-    shifted(series.by_poses(known))
-        .or_else(|| turns().find_map(|quarters| changed(OneSide::Mirrored, quarters)))
-        .or_else(|| turns().filter(|q| !open.contains(q)).find_map(|quarters| changed(OneSide::Inverted, quarters)))
-        .unwrap_or(error)
+    let explains = |what: &OneSide| undone(what).is_some_and(|apart| 2.0 * apart < as_they_are);
+    [OneSide::Mirrored, OneSide::Inverted].into_iter().filter(explains).collect()
+}
+
+/// Which of these was done to the pictures of one side, where the pairs miss their rig by so much as they are, and with
+/// it undone most of them miss it by less than half of that: the one with which they miss it least.
+pub fn changed(
+    corners: &Corners,
+    any: &[OneSide],
+    missed: Missed,
+    fitting: impl Fn(&Corners) -> Option<Fit>,
+) -> Option<Error> {
+    let undone = |(what, quarters): (OneSide, usize)| {
+        let undone = with_right(corners, what, quarters);
+        let explains = |fit: &Fit| fit.is_of_most(&undone) && 2.0 * fit.missed.times < missed.times;
+        let fit = fitting(&undone).filter(explains)?;
+        Some((fit.missed.times, Error::ChangedSide { what, fit: fit.pairs, of: undone.pairs.len() }))
+    };
+    let (turns, open) = (corners.board.turns_of_outline(), corners.board.turns_left_open());
+    let with_turns = |&what: &OneSide| turns.iter().map(move |&quarters| (what, quarters));
+    let is_change = |&(what, quarters): &(OneSide, usize)| what == OneSide::Mirrored || !open.contains(&quarters);
+    let all = any.iter().flat_map(with_turns).filter(is_change).filter_map(undone);
+    Some(all.min_by(|a, b| a.0.total_cmp(&b.0))?.1)
 }
 
 /// The pairs by their places in the series; pairs in which no board was found have one as well.

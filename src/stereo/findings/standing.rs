@@ -13,8 +13,9 @@ use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
 use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
 use crate::stereo::error::BY_SINCE;
+use crate::stereo::findings::one_side::Fit;
 use crate::stereo::findings::{
-    self, Finding, Kind, common_misfit, hold, one_side, other_rig, own_lenses, rolling_shutter, without_drift,
+    self, Finding, Kind, common_misfit, hold, one_side, other_rig, own_lenses, rolling_shutter, two_rigs, without_drift,
 };
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -39,7 +40,10 @@ pub struct Asked {
 
 /// Calibrates the rig that stands now, and says what happened to it before.
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let fitting = |corners: &Corners| standing(corners, asked).ok().map(|(found, _)| found.views.len());
+    let fitting = |corners: &Corners| {
+        let (found, _) = standing(corners, asked).ok()?;
+        Some(Fit { pairs: found.views.len(), missed: common_misfit::missed(&found) })
+    };
     let known = asked.options.known.as_ref();
     let explain = |error| one_side::explain(error, corners, known, fitting);
     let (mut found, mut told) = standing(corners, asked).map_err(explain)?;
@@ -52,7 +56,17 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
             allow_for(&mut found, &[step]);
             told.push(rolling);
         }
-        _ => told.extend(common_misfit::look(asked_of, &told)),
+        _ => {
+            let misfit = common_misfit::look(asked_of, &told);
+            if misfit.as_ref().is_some_and(|misfit| misfit.cause == Cause::NotSimultaneous.word()) {
+                let missed = common_misfit::missed(&found);
+                if let Some(changed) = one_side::changed(corners, &one_side::suspected(corners, known), missed, fitting)
+                {
+                    return Err(changed);
+                }
+            }
+            told.extend(misfit);
+        }
     }
     Ok((found, told))
 }
@@ -110,7 +124,10 @@ fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding)
 /// The rig without the first or the last pairs that contradict the others; `told` is the step that these are, where it
 /// was found.
 fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut found = calibrate(corners, &asked.options)?;
+    let mut found = match calibrate(corners, &asked.options) {
+        Err(error @ Error::Contradiction { .. }) => return since_another(corners, asked, error),
+        found => found?,
+    };
     let first = first_run(&found, corners, told.as_ref());
     let last = last_run(&found, corners, asked, told.as_ref());
     if let Some(last) = &last
@@ -140,6 +157,20 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
     }
     trailing(&mut found, corners);
     Ok((found, findings))
+}
+
+/// The rig that followed on another one, where that is why pairs contradict each other.
+fn since_another(corners: &Corners, asked: &Asked, error: Error) -> Result<(Calibration, Vec<Finding>), Error> {
+    let later = || {
+        let first = two_rigs::first_of_later(corners, one_side::missed(&error)?, &asked.options)?;
+        let kept = since(corners, &first)?;
+        Some((calibrate(&kept, &asked.options).ok()?, kept))
+    };
+    let Some((calibration, kept)) = later() else { return Err(error) };
+    let mut change = another_rig(None, kept.pairs.iter().map(|pair| pair.pair.clone()).collect());
+    let lengths = lengths(&calibration, asked.extent);
+    two_rigs::retell(&mut change, corners, &calibration, None, &lengths, &asked.options);
+    Ok(stands_since(corners, asked, Later { corners: kept, calibration, change: None }, change))
 }
 
 /// The first pairs, two or more, where they contradict the others and are of one other rig; `told` is a step that was
@@ -266,6 +297,7 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     {
         return None;
     }
+    let all_corners = corners;
     let corners = since(corners, change.pairs.first()?)?;
     let calibration = calibrate(&corners, &asked.options).ok()?;
     let worst = |calibration: &Calibration| {
@@ -291,7 +323,13 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
         change.effect_mm = again.effect_mm.into_iter().chain(change.effect_mm).reduce(f64::max);
         return None;
     }
-    (worst(&calibration) < with_step).then_some(Later { corners, calibration, change: further })
+    if worst(&calibration) >= with_step {
+        return None;
+    }
+    let told = change.along.as_ref().map(|along| along.in_layout(&all.layout, &calibration.layout).whole);
+    let lengths = lengths(&calibration, asked.extent);
+    two_rigs::retell(change, all_corners, &calibration, told, &lengths, &asked.options);
+    Some(Later { corners, calibration, change: further })
 }
 
 /// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted

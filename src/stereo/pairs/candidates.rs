@@ -3,14 +3,16 @@
 
 use rayon::prelude::*;
 
+use crate::geometry::Transform;
 use crate::imaging::{Board, Corner, Corners, PairCorners, Side, Skipped};
+use crate::statistics::median;
 use crate::stereo::data::{Observation, View};
 use crate::stereo::error::{Error, ONE_PICTURE};
 use crate::stereo::init::homography::{self, FEWEST_CORNERS};
 use crate::stereo::init::single_camera::{self, OneCamera};
 use crate::stereo::model::KnownLenses;
 use crate::stereo::pairs::discarded::too_few_pairs;
-use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs};
+use crate::stereo::pairs::{Cause, DiscardedPair, fewest_pairs, numbering};
 
 /// Pairs to choose from, in the order in which they were taken, with each camera on its own pictures.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,6 +89,20 @@ impl Candidates {
 }
 
 impl Candidates {
+    /// How far apart the places of the right camera are in the median that the pictures of each pair give by themselves,
+    /// as an angle and a share of the boards' distance, where the right pictures' numbering may be turned so.
+    pub fn places_apart(&self, turns: &[usize]) -> Option<f64> {
+        let [left, right] = &self.cameras;
+        let both: Vec<_> = left.poses.iter().zip(&right.poses).map(|(l, r)| l.zip(*r)).collect();
+        let distance_mm = median(both.iter().flatten().map(|(l, _)| l.translation.vector.norm()))?;
+        let (rig, turned) = numbering::agreed(turns, &both, distance_mm)?;
+        let off = |(pair, quarters): (&Option<(Transform, Transform)>, usize)| {
+            let (left, right) = (*pair)?;
+            Some(numbering::deviation(&(right * numbering::renumbered(quarters) * left.inverse()), &rig, distance_mm))
+        };
+        median(both.iter().zip(turned).filter_map(off))
+    }
+
     /// The number of pairs and the most that a corner moves from one to another, px, where they all show the board in
     /// one pose: by a small part of what a board must move over the pictures that are to tell the cameras.
     pub fn one_pose(&self) -> Option<(usize, f64)> {

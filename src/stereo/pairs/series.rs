@@ -23,7 +23,7 @@ use crate::stereo::solve::{Priors, Problem};
 use crate::stereo::{Error, Lens, Rig};
 
 /// A pair that misses the rig by so many times what pairs usually do is not one of them.
-const SEVERAL: f64 = 6.0;
+pub const SEVERAL: f64 = 6.0;
 
 /// Rounds of calibrating and of looking which pairs belong.
 const MOST_ROUNDS: usize = 5;
