@@ -46,7 +46,7 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
         false => format!("during the series: {}", finding.action),
     };
     lines.extend(judged.facts.findings.iter().map(found));
-    lines.extend(pairs(calibration));
+    lines.extend(pairs(calibration, &judged.facts.findings));
     lines.push(rig(calibration, judged));
     lines.push(board(calibration, judged));
     lines.extend(next(judged).into_iter().take(MOST_NEXT).map(|what| format!("next: {what}")));
@@ -139,8 +139,8 @@ fn second_board(judged: &Judged) -> Option<String> {
     ))
 }
 
-/// How many pairs were used, and in a line a reason which were not.
-fn pairs(calibration: &Calibration) -> Vec<String> {
+/// How many pairs were used, and in a line a reason which were not; a finding that is the reason was told before.
+fn pairs(calibration: &Calibration, findings: &[Finding]) -> Vec<String> {
     /// Causes and reasons with a line of their own; the page has all.
     const MOST: usize = 6;
     let total = calibration.views.len() + calibration.skipped.len();
@@ -160,6 +160,11 @@ fn pairs(calibration: &Calibration) -> Vec<String> {
     lines.extend(groups.iter().take(MOST).map(|(.., pairs)| {
         let reason = &pairs[0].reason;
         let alike = pairs.iter().all(|pair| pair.reason == *reason);
+        let reason = match findings.iter().find_map(|finding| reason.strip_suffix(&finding.action)) {
+            Some("") => "that change",
+            Some(why) => why.trim_end_matches(": "),
+            None => reason,
+        };
         let names: Vec<String> = pairs.iter().map(|pair| pair.pair.clone()).collect();
         match alike {
             true => format!("  without {}: {reason}", named(&names)),
@@ -323,13 +328,30 @@ pub(super) fn advice(judged: &Judged) -> String {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
     use crate::imaging::Side;
     use crate::stereo::calibrate::calibrate;
+    use crate::stereo::findings::standing::{Asked, calibrate_standing};
     use crate::stereo::judge::ledger::Standards;
     use crate::stereo::model::KnownLenses;
     use crate::stereo::select::options::Options;
     use crate::stereo::synthetic::{BROWN4, World, judged};
+
+    #[test]
+    fn what_changed_is_told_once() {
+        let world = World::new(12, 4);
+        let later = world.with_camera_moved(Vector3::y() * 0.01, Vector3::zeros()).corners(14);
+        for (pairs, left_out) in [(5..12, "the rig changed after it"), (10..12, "that change")] {
+            let mut corners = world.corners(14);
+            corners.pairs[pairs.clone()].clone_from_slice(&later.pairs[pairs.clone()]);
+            let asked = Asked { options: BROWN4, tolerance_mm: 0.05, extent: Extent::Boards };
+            let (found, told) = calibrate_standing(&corners, &asked).unwrap();
+            let said = super::pairs(&found, &told);
+            assert!(said.len() == 2 && said[1].ends_with(&format!(": {left_out}")), "{said:?} {told:?}");
+        }
+    }
 
     /// What is known of lenses that are others makes all other lines as they are.
     #[test]
