@@ -24,6 +24,7 @@ use crate::stereo::model::Layout;
 use crate::stereo::pairs::numbering::seen_on_rig;
 use crate::stereo::pairs::series::SEVERAL;
 use crate::stereo::pairs::{Cause, Missed, fewest_pairs};
+use crate::stereo::select::model_comparison::OF_PAIR;
 use crate::stereo::select::options::Options;
 use crate::stereo::volume::lengths::VolumeLengths;
 
@@ -34,20 +35,27 @@ const MOST: f64 = 0.8;
 const CHANCE: f64 = 0.01;
 
 /// The first pair of the later rig, where pairs that miss a common one by so much fit two, one after the other, that
-/// they miss by less than half of that.
+/// they miss by less than half of that, beyond what two rigs take up of the pairs' own scatter.
 pub(super) fn first_of_later(corners: &Corners, missed: Missed, options: &Options) -> Option<String> {
     let pairs = &corners.pairs;
     let fits = |pairs: &[PairCorners]| {
         let found = calibrate(&Corners { pairs: pairs.to_vec(), ..corners.clone() }, options).ok()?;
-        let is_of_most = found.views.len() as f64 >= MOST * pairs.len() as f64;
-        (is_of_most && 2.0 * common_misfit::missed(&found).times < missed.times).then_some(found)
+        (found.views.len() as f64 >= MOST * pairs.len() as f64).then_some(found)
     };
     let fewest = fewest_pairs(options.known.as_ref());
     let tails = [2, 4].into_iter().map(|share| pairs.len() / share).filter(|tail| *tail >= fewest);
     let found = tails.into_iter().find_map(|tail| fits(&pairs[pairs.len() - tail..]))?;
     let first = first_that_fits(&found, pairs)?;
-    let are_two = first >= fewest && pairs.len() - first >= fewest;
-    (are_two && fits(&pairs[..first]).is_some() && fits(&pairs[first..]).is_some()).then(|| pairs[first].pair.clone())
+    if first < fewest || pairs.len() - first < fewest {
+        return None;
+    }
+    let two = [fits(&pairs[..first])?, fits(&pairs[first..])?];
+    // Share of what the pairs tell of where they see the right camera that is left to scatter beside so many numbers.
+    let left = |numbers: usize| 1.0 - numbers as f64 / (OF_PAIR * pairs.len()) as f64;
+    let [before, after] = two.each_ref().map(|rig| rig.layout.count());
+    let times = two.iter().map(|rig| common_misfit::missed(rig).times).fold(0.0, f64::max);
+    let explain = (2.0 * times).powi(2) * left(after) < missed.times.powi(2) * left(before + after);
+    explain.then(|| pairs[first].pair.clone())
 }
 
 /// The earliest pair that fits a rig of the last ones and from which on most pairs do.
@@ -215,9 +223,10 @@ mod tests {
         let rights: Vec<_> = shuffled.pairs.iter().map(|pair| pair.right.clone()).collect();
         (0..PAIRS).for_each(|at| shuffled.pairs[at].right = rights[(5 * at + 3) % PAIRS].clone());
         let asked = Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() };
-        for corners in [shuffled, world.corners_by_hand(14, 4.0)] {
-            let said = calibrate_standing(&corners, &asked);
-            assert!(matches!(said, Err(Error::Contradiction { .. })), "{said:?}");
+        let by_hand = [8, 10, 12, 16].map(|pairs| World::new(pairs, 13).corners_by_hand(14, 4.0));
+        for corners in by_hand.into_iter().chain([shuffled]) {
+            let said = calibrate_standing(&corners, &asked).map(|(_, told)| told);
+            assert!(matches!(said, Err(Error::Contradiction { .. })), "{} pairs: {said:?}", corners.pairs.len());
         }
     }
 }
