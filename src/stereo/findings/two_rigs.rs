@@ -26,6 +26,7 @@ use crate::stereo::pairs::series::SEVERAL;
 use crate::stereo::pairs::{Cause, Missed, fewest_pairs};
 use crate::stereo::select::model_comparison::OF_PAIR;
 use crate::stereo::select::options::Options;
+use crate::stereo::solve::uncertainty::worst_focal_sigma;
 use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Share of the pairs on either side of a step that must fit its rig.
@@ -94,17 +95,23 @@ pub(super) fn retell(
     *change = Finding { action, remedy, pairs: std::mem::take(&mut change.pairs), ..told };
 }
 
-/// The step from one rig to the other, told by its likeliest cause. `None` where what was told explains it, or nothing
-/// does.
+/// The step from one rig to the other, told by its likeliest cause. `None` where what was told explains it, nothing
+/// does, or one of the rigs hardly tells its focal lengths.
 fn step(
     before: &Calibration,
     after: &Calibration,
     told: Option<DVector<f64>>,
     lengths: &VolumeLengths,
 ) -> Option<Finding> {
+    /// Share of a focal length up to which its standard deviation leaves the valley along which the rig is known
+    /// straight: over such a step the numbers leave their tangent by as large a share of it.
+    const STRAIGHT: f64 = 0.1;
     let numbers = after.layout.shape_start();
     let layout = Layout { shape: false, ..after.layout };
     let rigs = [before, after];
+    if rigs.iter().any(|rig| worst_focal_sigma(&rig.covariance, &rig.layout, rig.rig()) > STRAIGHT) {
+        return None;
+    }
     let joint = before.covariance.view((0, 0), (numbers, numbers)) + after.covariance.view((0, 0), (numbers, numbers));
     let off = after.layout.between(&before.values.shared, &after.values.shared).rows(0, numbers).into_owned();
     let pairs = rigs.iter().map(|rig| rig.views.len()).sum();
@@ -156,6 +163,7 @@ fn step(
 mod tests {
     use nalgebra::Vector3;
 
+    use crate::geometry::{rotation_vector, transform};
     use crate::imaging::Corners;
     use crate::stereo::Error;
     use crate::stereo::findings::standing::{Asked, calibrate_standing};
@@ -214,6 +222,22 @@ mod tests {
             let turned = |world: &World| world.with_camera_moved(Vector3::y() * deg.to_radians(), Vector3::zeros());
             is_step(turned, "yaw", deg, 0.05 * deg);
         }
+    }
+
+    /// Five pairs of boards that are all alike on either side of the step leave their focal lengths open.
+    #[test]
+    fn rigs_that_hardly_tell_their_lenses_do_not_say_what_changed() {
+        let mut world = World::new(10, 13);
+        for pose in &mut world.poses {
+            *pose = transform(rotation_vector(pose) * 0.05, pose.translation.vector);
+        }
+        let mut corners = world.corners(14);
+        let later = world.with_camera_moved(Vector3::z() * 0.05, Vector3::zeros()).corners(15);
+        corners.pairs[5..].clone_from_slice(&later.pairs[5..]);
+        let asked = Asked { options: Options::default(), tolerance_mm: 0.05, extent: Extent::default() };
+        let (_, told) = calibrate_standing(&corners, &asked).unwrap();
+        // The roll, or that nobody knows; a lens that was focused by a half is neither.
+        assert!(told.iter().all(|finding| finding.cause != "focus"), "{told:?}");
     }
 
     #[test]
