@@ -18,6 +18,7 @@ use super::{Finding, Kind, hold};
 use crate::difference::{Difference, TOLD_APART};
 use crate::imaging::{Corners, PairCorners};
 use crate::statistics::median;
+use crate::stereo::Rig;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::init::board_pose::misfit_px;
 use crate::stereo::model::Layout;
@@ -95,6 +96,23 @@ pub(super) fn retell(
     *change = Finding { action, remedy, pairs: std::mem::take(&mut change.pairs), ..told };
 }
 
+/// Whether the numbers of a rig are known along a straight line.
+fn tells_its_lenses(found: &Calibration) -> bool {
+    /// Largest standard deviation of a focal length as a share of it: over such a step the numbers leave the tangent of
+    /// the valley along which they are known by as large a share of it.
+    const STRAIGHT: f64 = 0.1;
+    worst_focal_sigma(&found.covariance, &found.layout, found.rig()) <= STRAIGHT
+}
+
+/// The rig about which a finite step is taken for its directions: with the lenses before it, so that a focal length
+/// changes by a share of those; a turn takes the translation along an arc, whose chord is square to its middle.
+fn half_way(before: &Rig, after: &Rig) -> Rig {
+    let mut rig = before.clone();
+    let translation = &mut rig.right_from_left.translation.vector;
+    *translation = translation.lerp(&after.right_from_left.translation.vector, 0.5);
+    rig
+}
+
 /// The step from one rig to the other, told by its likeliest cause. `None` where what was told explains it, nothing
 /// does, or one of the rigs hardly tells its focal lengths.
 fn step(
@@ -103,15 +121,12 @@ fn step(
     told: Option<DVector<f64>>,
     lengths: &VolumeLengths,
 ) -> Option<Finding> {
-    /// Share of a focal length up to which its standard deviation leaves the valley along which the rig is known
-    /// straight: over such a step the numbers leave their tangent by as large a share of it.
-    const STRAIGHT: f64 = 0.1;
-    let numbers = after.layout.shape_start();
-    let layout = Layout { shape: false, ..after.layout };
     let rigs = [before, after];
-    if rigs.iter().any(|rig| worst_focal_sigma(&rig.covariance, &rig.layout, rig.rig()) > STRAIGHT) {
+    if !rigs.into_iter().all(tells_its_lenses) {
         return None;
     }
+    let numbers = after.layout.shape_start();
+    let layout = Layout { shape: false, ..after.layout };
     let joint = before.covariance.view((0, 0), (numbers, numbers)) + after.covariance.view((0, 0), (numbers, numbers));
     let off = after.layout.between(&before.values.shared, &after.values.shared).rows(0, numbers).into_owned();
     let pairs = rigs.iter().map(|rig| rig.views.len()).sum();
@@ -123,10 +138,7 @@ fn step(
         let common = DVector::zeros(numbers);
         Some(Change { amounts: difference.amounts(directions)?, common, gain: 2.0 * gain, scatter: 1.0 })
     };
-    // Shares of the lens before; a turn takes the translation along an arc, whose chord is square to its middle.
-    let mut rig = before.rig().clone();
-    let translation = &mut rig.right_from_left.translation.vector;
-    *translation = translation.lerp(&after.rig().right_from_left.translation.vector, 0.5);
+    let rig = half_way(before.rig(), after.rig());
     let hypotheses = hypothesis::all(&layout, &rig);
     let candidates = Candidate::all(&change, pairs, &hypotheses, (&layout, &rig), true);
     let mut equals = likeliest(&candidates, pairs);
