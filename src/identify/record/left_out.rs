@@ -3,11 +3,12 @@
 //! In: the rows that were fitted and those that were left out, with the errors that the robot has in these. Out: the
 //! joint, and the finding. Method: four looks. A column that stands some rows off in them. Rows in which a joint is not
 //! where it is in most of them, and rows that fill a part of its range: how likely it is that so many of them are among
-//! those left out by chance (the hypergeometric distribution). Errors along which a joint moves the target: gross errors go anywhere, so that the
-//! cosine to any direction is as often of one size as of another, and the cosines together are tested (Fisher's
-//! method). A joint that stands elsewhere is told from one that a load bends by the amounts: alike, or as the torque
-//! about it; else both are named. Each times the joints and ways that were looked at. Goes wrong: a joint that moves in
-//! every row; few rows whose errors share a direction in the sensor's frame, which is then no joint's.
+//! those left out by chance (the hypergeometric distribution). Errors along which a joint moves the target: gross
+//! errors go anywhere, so that the cosine to any direction is as often of one size as of another, and the cosines
+//! together are tested (Fisher's method). A joint that stands elsewhere is told from one that a load bends by the
+//! amounts: alike, or as the torque about it; else both are named. Each times the joints and ways that were looked at.
+//! Goes wrong: a joint that moves in every row; few rows whose errors share a direction in the sensor's frame, which is
+//! then no joint's.
 
 mod shifted_column;
 

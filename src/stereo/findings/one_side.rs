@@ -18,8 +18,8 @@ use crate::stereo::pairs::candidates::Candidates;
 use crate::stereo::pairs::mixups::mirror;
 use crate::stereo::pairs::shifts::{self, Partners};
 
-/// Share of the pairs that must fit one rig then.
-const MOST: f64 = 0.8;
+/// Share of the pairs that must fit a rig that explains them.
+pub(super) const MOST: f64 = 0.8;
 
 /// What becomes of pairs as a rig.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -161,12 +161,9 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
 
 /// The rig that followed on another one, where that is why pairs contradict each other.
 fn since_another(corners: &Corners, asked: &Asked, error: Error) -> Result<(Calibration, Vec<Finding>), Error> {
-    let later = || {
-        let first = two_rigs::first_of_later(corners, one_side::missed(&error)?, &asked.options)?;
-        let kept = since(corners, &first)?;
-        Some((calibrate(&kept, &asked.options).ok()?, kept))
-    };
-    let Some((calibration, kept)) = later() else { return Err(error) };
+    let missed = one_side::missed(&error);
+    let later = missed.and_then(|missed| two_rigs::later(corners, missed, &asked.options));
+    let Some((kept, calibration)) = later else { return Err(error) };
     let mut change = another_rig(None, kept.pairs.iter().map(|pair| pair.pair.clone()).collect());
     let lengths = lengths(&calibration, asked.extent);
     two_rigs::retell(&mut change, corners, &calibration, None, &lengths, &asked.options);
@@ -297,9 +294,8 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     {
         return None;
     }
-    let all_corners = corners;
-    let corners = since(corners, change.pairs.first()?)?;
-    let calibration = calibrate(&corners, &asked.options).ok()?;
+    let kept = since(corners, change.pairs.first()?)?;
+    let calibration = calibrate(&kept, &asked.options).ok()?;
     let worst = |calibration: &Calibration| {
         let lengths = lengths(calibration, asked.extent);
         lengths.worst(|length| length.calibration_mm).map_or(f64::INFINITY, |(mm, _)| mm)
@@ -328,8 +324,8 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
     }
     let told = change.along.as_ref().map(|along| along.in_layout(&all.layout, &calibration.layout).whole);
     let lengths = lengths(&calibration, asked.extent);
-    two_rigs::retell(change, all_corners, &calibration, told, &lengths, &asked.options);
-    Some(Later { corners, calibration, change: further })
+    two_rigs::retell(change, corners, &calibration, told, &lengths, &asked.options);
+    Some(Later { corners: kept, calibration, change: further })
 }
 
 /// A change that stays in the rig: of one that drifts the rig is that of the middle of the series, and what it drifted

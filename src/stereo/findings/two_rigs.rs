@@ -13,6 +13,7 @@ use nalgebra::DVector;
 use super::candidates::{Candidate, described, likeliest};
 use super::common_misfit;
 use super::hypothesis;
+use super::one_side::MOST;
 use super::series::Change;
 use super::{Finding, Kind, hold};
 use crate::difference::{Difference, TOLD_APART};
@@ -30,18 +31,15 @@ use crate::stereo::select::options::Options;
 use crate::stereo::solve::uncertainty::worst_focal_sigma;
 use crate::stereo::volume::lengths::VolumeLengths;
 
-/// Share of the pairs on either side of a step that must fit its rig.
-const MOST: f64 = 0.8;
-
 /// Chance that a cause that is the right one leaves more than it may.
 const CHANCE: f64 = 0.01;
 
-/// The first pair of the later rig, where pairs that miss a common one by so much fit two, one after the other, that
-/// they miss by less than half of that, beyond what two rigs take up of the pairs' own scatter.
-pub(super) fn first_of_later(corners: &Corners, missed: Missed, options: &Options) -> Option<String> {
+/// The later rig with its pairs, where pairs that miss a common one by so much fit two, one after the other, that they
+/// miss by less than half of that, beyond what two rigs take up of the pairs' own scatter.
+pub(super) fn later(corners: &Corners, missed: Missed, options: &Options) -> Option<(Corners, Calibration)> {
     let pairs = &corners.pairs;
     let fits = |pairs: &[PairCorners]| {
-        let found = calibrate(&Corners { pairs: pairs.to_vec(), ..corners.clone() }, options).ok()?;
+        let found = calibrate(&part(corners, pairs), options).ok()?;
         (found.views.len() as f64 >= MOST * pairs.len() as f64).then_some(found)
     };
     let fewest = fewest_pairs(options.known.as_ref());
@@ -51,13 +49,19 @@ pub(super) fn first_of_later(corners: &Corners, missed: Missed, options: &Option
     if first < fewest || pairs.len() - first < fewest {
         return None;
     }
-    let two = [fits(&pairs[..first])?, fits(&pairs[first..])?];
+    let two @ [before, after] = &[fits(&pairs[..first])?, fits(&pairs[first..])?];
     // Share of what the pairs tell of where they see the right camera that is left to scatter beside so many numbers.
-    let left = |numbers: usize| 1.0 - numbers as f64 / (OF_PAIR * pairs.len()) as f64;
-    let [before, after] = two.each_ref().map(|rig| rig.layout.count());
+    let left = |numbers: usize| (1.0 - numbers as f64 / (OF_PAIR * pairs.len()) as f64).max(0.0);
+    let [numbers_before, numbers_after] = [before, after].map(|rig| rig.layout.count());
     let times = two.iter().map(|rig| common_misfit::missed(rig).times).fold(0.0, f64::max);
-    let explain = (2.0 * times).powi(2) * left(after) < missed.times.powi(2) * left(before + after);
-    explain.then(|| pairs[first].pair.clone())
+    let [one, both] = [numbers_after, numbers_before + numbers_after].map(left);
+    let explain = (2.0 * times).powi(2) * one < missed.times.powi(2) * both;
+    explain.then(|| (part(corners, &pairs[first..]), after.clone()))
+}
+
+/// The same corners of these pairs alone.
+fn part(corners: &Corners, pairs: &[PairCorners]) -> Corners {
+    Corners { pairs: pairs.to_vec(), ..corners.clone() }
 }
 
 /// The earliest pair that fits a rig of the last ones and from which on most pairs do.
@@ -84,10 +88,11 @@ pub(super) fn retell(
     options: &Options,
 ) {
     let Some(first) = change.pairs.first() else { return };
-    let before = corners.pairs.iter().take_while(|pair| pair.pair != *first).cloned().collect();
+    let pairs = &corners.pairs;
+    let before = &pairs[..pairs.iter().position(|pair| pair.pair == *first).unwrap_or(0)];
     let layout = &after.layout;
     let options = Options { lens: layout.left, shape: Some(layout.shape), ..options.clone() };
-    let before = calibrate(&Corners { pairs: before, ..corners.clone() }, &options).ok();
+    let before = calibrate(&part(corners, before), &options).ok();
     let before = before.filter(|before| before.layout == *layout);
     let Some(told) = before.and_then(|before| step(&before, after, told, lengths)) else { return };
     let effect_mm = told.effect_mm.unwrap_or(0.0);
