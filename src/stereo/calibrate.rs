@@ -4,6 +4,8 @@
 //! pairs that were not and why. Goes wrong: too few pairs, pairs that contradict each other, views too similar to tell
 //! the cameras.
 
+use std::sync::OnceLock;
+
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
@@ -159,100 +161,136 @@ impl Calibration {
 
 /// Calibrates both cameras and the rig from the pairs that belong together.
 pub fn calibrate(corners: &Corners, options: &Options) -> Result<Calibration, Error> {
-    calibrate_by(corners, options, false, false)
+    RigPairs::new(corners, options, false)?.calibrate(false)
 }
 
-/// The same; with `runs`, the first or the last pairs of the series stay in where they contradict the others, so that a
-/// change of the rig can be found over the series; `by_pairs` with the lenses that the pairs tell, whatever each camera
-/// alone tells of them. How far black has spread on a grid of separate tags is found by the way.
-pub fn calibrate_by(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
-    /// Share of its standard deviation that is not worth another round, and rounds at the most: the first step is
-    /// nearly the last.
-    const STILL: f64 = 0.1;
-    const ROUNDS: usize = 3;
-    let mut found = with_spread(corners, options, runs, by_pairs)?;
-    for _ in 1..ROUNDS {
-        let Some(change_mm) =
-            found.spread.as_ref().filter(|s| s.change_mm.abs() > STILL * s.sigma_mm).map(|s| s.change_mm)
-        else {
-            break;
-        };
-        let board = found.board.with_spread_mm(found.board.spread_mm() + change_mm);
-        if board == found.board {
-            break;
+/// The pairs of one rig, to be calibrated with the lenses that they or each camera alone tell.
+pub struct RigPairs<'a> {
+    corners: &'a Corners,
+    options: &'a Options,
+    /// Whether the first or the last pairs of the series stay in where they contradict the others, so that a change of
+    /// the rig can be found over the series.
+    runs: bool,
+    candidates: Candidates,
+    series: Series,
+    /// What the pairs choose, once it was asked for.
+    of_pairs: OnceLock<Choice>,
+}
+
+impl<'a> RigPairs<'a> {
+    /// Finds them; `runs`: see [`RigPairs::runs`].
+    pub fn new(corners: &'a Corners, options: &'a Options, runs: bool) -> Result<RigPairs<'a>, Error> {
+        let candidates = Candidates::new(corners, options.known.as_ref())?;
+        let series = series::find(&candidates, runs).map_err(|error| error.of_one_pose(candidates.one_pose()))?;
+        Ok(RigPairs { corners, options, runs, candidates, series, of_pairs: OnceLock::new() })
+    }
+
+    /// Calibrates them; `by_pairs` with the lenses that the pairs tell, whatever each camera alone tells of them. How
+    /// far black has spread on a grid of separate tags is found by the way.
+    pub fn calibrate(&self, by_pairs: bool) -> Result<Calibration, Error> {
+        /// Share of its standard deviation that is not worth another round, and rounds at the most: the first step is
+        /// nearly the last.
+        const STILL: f64 = 0.1;
+        const ROUNDS: usize = 3;
+        let mut found = self.with_spread(by_pairs)?;
+        for _ in 1..ROUNDS {
+            let Some(change_mm) =
+                found.spread.as_ref().filter(|s| s.change_mm.abs() > STILL * s.sigma_mm).map(|s| s.change_mm)
+            else {
+                break;
+            };
+            let board = found.board.with_spread_mm(found.board.spread_mm() + change_mm);
+            if board == found.board {
+                break;
+            }
+            let corners = Corners { board, ..self.corners.clone() };
+            found = RigPairs::new(&corners, self.options, self.runs)?.with_spread(by_pairs)?;
         }
-        found = with_spread(&Corners { board, ..corners.clone() }, options, runs, by_pairs)?;
+        Ok(found)
     }
-    Ok(found)
+
+    fn of_pairs(&self) -> Result<Choice, Error> {
+        if let Some(choice) = self.of_pairs.get() {
+            return Ok(choice.clone());
+        }
+        let choice = lens_ladder::of_pairs(&self.series.problem, &self.corners.board, self.options)?;
+        Ok(self.of_pairs.get_or_init(|| choice).clone())
+    }
+
+    /// The same with the spread that the board has.
+    fn with_spread(&self, by_pairs: bool) -> Result<Calibration, Error> {
+        let RigPairs { corners, options, candidates, .. } = self;
+        let Series { problem: start, discarded, missed, .. } = &self.series;
+        let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
+        let missed_at_all = Some(*missed).filter(|_| !by_pairs);
+        let choose =
+            |below| lens_ladder::choose(start, || self.of_pairs(), missed_at_all, &corners.board, options, below);
+        let explained = |e: Error| e.without(&skipped).of_one_pose(candidates.one_pose()).of_lens(options.lens);
+        let chosen = solved_by(start, choose).map_err(explained)?;
+        Ok(self.stated(chosen, skipped))
+    }
+
+    /// The calibration with what is stated of it.
+    fn stated(&self, (choice, solved, by_corners): Chosen, skipped: Vec<Skipped>) -> Calibration {
+        let (known, board) = (self.options.known.as_ref(), self.corners.board);
+        let Series { problem: start, discarded, runs, alone_px, .. } = &self.series;
+        let Choice { layout, scatter, scores: lens_scores, .. } = choice;
+        let lens_check = known.and_then(|known| known_lenses::check(start, known, &layout));
+        let neighbours = solved.problem.neighbours();
+        let inflation = solved.inflation();
+        let by_noise = by_corners * inflation;
+        let without_scatter = by_noise.clone();
+        let print = print_share(&solved, &board, &layout);
+        let spread = board.is_grid().then(|| Spread::of(&solved.problem, &layout)).flatten();
+        let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
+        let stated =
+            stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
+        let Stated { mut covariance, pair_scatter, witnesses, weighed } = stated;
+        if let Some(spread) = &spread {
+            covariance += spread.covariance(inflation);
+        }
+        let Problem { views, values, priors } = solved.problem;
+        let mut values = weighed.unwrap_or(values);
+        let mut own_noise = solved.noise;
+        if let Some(print) = print {
+            covariance += print.covariance - without_scatter;
+            own_noise = print.own_noise;
+        }
+        values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: covariance.clone() });
+        Calibration {
+            board,
+            spread,
+            layout,
+            noise: solved.noise,
+            own_noise,
+            neighbours,
+            pair_scatter,
+            witnesses,
+            inflation,
+            priors,
+            each_alone: known.is_none() && scatter.is_some(),
+            runs: *runs,
+            alone_px: *alone_px,
+            skipped,
+            discarded: Discarded::new(&views, discarded.clone()),
+            standing: Standing::default(),
+            since_moment: Vec::new(),
+            known_sides: Side::BOTH.map(|side| known.is_some_and(|known| known.camera(side).is_some())),
+            lens_check,
+            lens_scores,
+            views,
+            values,
+            covariance,
+        }
+    }
 }
 
-/// The same with the spread that the board has.
-fn with_spread(corners: &Corners, options: &Options, runs: bool, by_pairs: bool) -> Result<Calibration, Error> {
-    let candidates = Candidates::new(corners, options.known.as_ref())?;
-    let one_pose = || candidates.one_pose();
-    let found = series::find(&candidates, runs).map_err(|error| error.of_one_pose(one_pose()))?;
-    let Series { problem: start, discarded, runs, alone_px, missed } = found;
-    let skipped: Vec<Skipped> = discarded.iter().map(DiscardedPair::skipped).collect();
-    let missed_at_all = Some(missed).filter(|_| !by_pairs);
-    let choose = |below| lens_ladder::choose(&start, missed_at_all, &corners.board, options, below);
-    let (choice, solved, by_corners) =
-        solved_by(&start, choose).map_err(|e| e.without(&skipped).of_one_pose(one_pose()).of_lens(options.lens))?;
-    let Choice { layout, scatter, scores: lens_scores, .. } = choice;
-    let known = options.known.as_ref();
-    let lens_check = known.and_then(|known| known_lenses::check(&start, known, &layout));
-    let neighbours = solved.problem.neighbours();
-    let inflation = solved.inflation();
-    let by_noise = by_corners * inflation;
-    let without_scatter = by_noise.clone();
-    let print = print_share(&solved, &corners.board, &layout);
-    let spread = corners.board.is_grid().then(|| Spread::of(&solved.problem, &layout)).flatten();
-    let print_excess = print.as_ref().map_or(1.0, |print| print.excess);
-    let stated = stated_uncertainty::state(&solved, &layout, by_noise, inflation, &lens_scores, scatter, print_excess);
-    let Stated { mut covariance, pair_scatter, witnesses, weighed } = stated;
-    if let Some(spread) = &spread {
-        covariance += spread.covariance(inflation);
-    }
-    let Problem { views, values, priors } = solved.problem;
-    let mut values = weighed.unwrap_or(values);
-    let mut own_noise = solved.noise;
-    if let Some(print) = print {
-        covariance += print.covariance - without_scatter;
-        own_noise = print.own_noise;
-    }
-    values.shared.rig.covariance = Some(Covariance { order: layout.names(), matrix: covariance.clone() });
-    Ok(Calibration {
-        board: corners.board,
-        spread,
-        layout,
-        noise: solved.noise,
-        own_noise,
-        neighbours,
-        pair_scatter,
-        witnesses,
-        inflation,
-        priors,
-        each_alone: known.is_none() && scatter.is_some(),
-        runs,
-        alone_px,
-        skipped,
-        discarded: Discarded::new(&views, discarded),
-        standing: Standing::default(),
-        since_moment: Vec::new(),
-        known_sides: Side::BOTH.map(|side| known.is_some_and(|known| known.camera(side).is_some())),
-        lens_check,
-        lens_scores,
-        views,
-        values,
-        covariance,
-    })
-}
+/// What was chosen for pairs, the pairs with it, and the covariance that their corners alone give.
+type Chosen = (Choice, Solved, DMatrix<f64>);
 
 /// The pairs with what is chosen for them. A lens that predicts held-out pairs best may still have numbers that can be
 /// exchanged for each other, where something that no lens explains made it look better; a simpler one is taken then.
-fn solved_by(
-    start: &Problem,
-    choose: impl Fn(Option<Lens>) -> Result<Choice, Error>,
-) -> Result<(Choice, Solved, DMatrix<f64>), Error> {
+fn solved_by(start: &Problem, choose: impl Fn(Option<Lens>) -> Result<Choice, Error>) -> Result<Chosen, Error> {
     let mut below = None;
     loop {
         let choice = choose(below)?;

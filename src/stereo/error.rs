@@ -11,7 +11,7 @@ pub const ONE_PICTURE: &str = "left and right picture are one picture";
 /// How the reason ends of pairs that `--since` leaves out.
 pub const BY_SINCE: &str = "which --since names";
 
-/// What was done to all pictures of one side; which side it was the pictures do not tell.
+/// What was done to all pictures of one side; which side it was only the place of the cameras tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum OneSide {
     /// Left and right, or top and bottom, are exchanged.
@@ -101,9 +101,15 @@ pub enum Error {
         /// The others, and why.
         without: Vec<Skipped>,
     },
-    /// Pairs that are compared with a rig fit it with their pictures exchanged.
-    #[error("left and right pictures are exchanged: each pair fits the calibration the other way round")]
-    Exchanged,
+    /// Pairs that are compared with a rig fit it with their pictures exchanged, or turned or mirrored back.
+    #[error("{}: each pair fits the calibration the other way round", match .flipped {
+        None => "left and right pictures are exchanged".to_owned(),
+        Some(how) => format!("the pictures are {how}"),
+    })]
+    OtherWayRound {
+        /// How they are turned or mirrored; `None` where they are exchanged.
+        flipped: Option<&'static str>,
+    },
     /// The box that a verdict is asked for lies where the cameras do not both look.
     #[error("no place of the box of `--volume` is seen by both cameras")]
     OutOfView {
@@ -164,11 +170,15 @@ pub enum Error {
     },
     /// All pictures of one side were changed on their way from the camera.
     #[error(
-        "the pictures of one side are {}: with that undone in the right ones {fit} of {of} pairs fit one rig, and as they are they do not",
-        what.words()
+        "the pictures of one side are {}: with that undone in the {} ones {fit} of {of} pairs fit one rig{}, and as they are they do not",
+        what.words(),
+        side.unwrap_or(Side::Right).name(),
+        if side.is_some() { " with its left camera to the left" } else { "" }
     )]
     ChangedSide {
         what: OneSide,
+        /// With that undone in the pictures of this side the left camera stands to the left; `None` where neither does.
+        side: Option<Side>,
         /// Pairs that fit one rig then.
         fit: usize,
         /// Pairs there are.
@@ -304,7 +314,7 @@ impl Explain for Error {
             Error::TooFewPairs { .. }
             | Error::OneSideBlind { .. }
             | Error::OutOfView { .. }
-            | Error::Exchanged
+            | Error::OtherWayRound { .. }
             | Error::NoSuchPair { .. }
             | Error::MoveUnsettled { .. }
             | Error::MoveTwice { .. }
@@ -323,8 +333,11 @@ impl Explain for Error {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
                 Error::OneSideBlind { .. } => "both cameras must show one board at once, in pictures as they took them",
-                Error::Exchanged => {
+                Error::OtherWayRound { flipped: None } => {
                     "name the left camera's pictures first; if the cameras themselves changed places, calibrate anew"
+                }
+                Error::OtherWayRound { flipped: Some(_) } => {
+                    "use the pictures of both cameras as these wrote them when they were calibrated"
                 }
                 Error::OutOfView { boards_mm: [[x0, y0, z0], [x1, y1, z1]] } => {
                     return Some(format!(

@@ -11,7 +11,6 @@ use crate::stereo::board_pose::answer::{MeasuredPose, POSE_LIMIT, Refusal, Serie
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation, stretch};
 use crate::stereo::board_pose::rig_change::consistency::{self, Along};
 use crate::stereo::board_pose::rig_change::elsewhere;
-use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::{Changed, scaled};
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::solve::alone::Known;
@@ -22,6 +21,7 @@ use crate::stereo::board_pose::start::{Start, baseline_ratio, starts};
 use crate::stereo::board_pose::turns;
 use crate::stereo::data::{Noise, View};
 use crate::stereo::pairs::candidates;
+use crate::stereo::pairs::flip::Flip;
 use crate::stereo::volume::Volume;
 
 /// Poses that stray this far beyond the limit in relation to the worst are left out together with it.
@@ -168,7 +168,9 @@ impl<'a> Run<'a> {
         let exchange =
             |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
         let exchanged = (misfit(&exchange), Judgement::Exchanged);
-        let flipped = Flip::ALL.map(|flip| (misfit(&|pair| self.flipped(pair, flip)), Judgement::Mirrored(flip)));
+        let flipped = Flip::ALL.map(|flip| {
+            (misfit(&|pair| flip.of_pair(&self.known.board, &self.known.rig, pair)), Judgement::Mirrored(flip))
+        });
         // A rig that is nearly its own mirror image fits both ways.
         let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
         if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
@@ -204,14 +206,6 @@ impl<'a> Run<'a> {
         let moves_mm = median(moves).unwrap_or(0.0);
         let (explanations, scaled_mm) = (vec![explanation], median(if_scaled));
         Some(Judgement::Contradicts(Changed { explanations, moves_mm, beyond: f64::INFINITY, scaled_mm }))
-    }
-
-    /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
-    fn flipped(&self, pair: &PairCorners, flip: Flip) -> PairCorners {
-        let rig = &self.known.rig;
-        let [left, right] = [(&rig.left, &pair.left), (&rig.right, &pair.right)]
-            .map(|(camera, corners)| flip.of(&self.known.board, [camera.width, camera.height], corners));
-        PairCorners { pair: pair.pair.clone(), left, right }
     }
 
     /// The bundle over the poses that fit together; the others are left out, and a rig that moved ends the run before

@@ -7,6 +7,7 @@
 //! looked at again. What is done about a finding follows from its effect and not from how surely it is seen
 //! ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
 
+mod before_step;
 mod candidates;
 pub mod common_misfit;
 pub mod hypothesis;
@@ -34,6 +35,8 @@ use crate::stereo::findings::hypothesis::Hypothesis;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::Layout;
 use crate::stereo::pairs::{Cause, DiscardedPair};
+use crate::stereo::select::cross_validation;
+use crate::stereo::solve::Problem;
 use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Chance that a series in which nothing happened has a finding, all looks together.
@@ -178,20 +181,37 @@ struct Pattern {
     by_pair: DVector<f64>,
 }
 
+impl Pattern {
+    /// The same by pairs, of a pattern by runs of them, whose first ones these are.
+    fn of_pairs(&self, first: &[usize], pairs: usize) -> Pattern {
+        let run = |pair: usize| first.partition_point(|first| *first <= pair) - 1;
+        let by_pair = DVector::from_fn(pairs, |pair, _| self.by_pair[run(pair)]);
+        Pattern { kind: self.kind, first: first[self.first], by_pair }
+    }
+}
+
 /// The change of the rig over the series that explains most, where there is one.
 pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Finding> {
     let problem = calibration.problem();
-    let count = problem.views.len();
+    let first = first_of_runs(&problem);
+    let count = first.len();
     if count < FEWEST {
         return None;
     }
-    let linear = Linear::new(&problem, &calibration.layout)?;
+    let linear = Linear::new(&problem, &calibration.layout)?.of_runs(&first);
     let hypotheses = hypothesis::all(&calibration.layout, calibration.rig());
     let pattern = significant(&linear, &hypotheses)?;
     let candidates = candidates(&linear, &hypotheses, calibration, &pattern, pattern.by_pair.as_slice());
     let equals = likeliest(&candidates, count);
-    let other = without_one(&linear, &hypotheses, calibration, &pattern, &equals);
-    finding(calibration, lengths, &equals, &pattern, other)
+    let other = without_one(&linear, &hypotheses, calibration, (&pattern, &first), &equals);
+    finding(calibration, lengths, &equals, &pattern.of_pairs(&first, problem.views.len()), other)
+}
+
+/// The first pairs of runs of pairs that show the board in one pose. Frames of a video and bursts of a camera share what
+/// moves a picture, and are no more evidence of a change than one of them.
+fn first_of_runs(problem: &Problem) -> Vec<usize> {
+    let groups = cross_validation::groups(&problem.views, &problem.values.poses);
+    (0..groups.len()).filter(|&i| i == 0 || groups[i] != groups[i - 1]).collect()
 }
 
 /// What may explain a pattern of these pairs.
@@ -219,7 +239,7 @@ fn without_one(
     linear: &Linear,
     hypotheses: &[Hypothesis],
     calibration: &Calibration,
-    pattern: &Pattern,
+    (pattern, first): (&Pattern, &[usize]),
     equals: &[&Candidate],
 ) -> Option<WithoutOne> {
     let without = |pair: usize| {
@@ -229,9 +249,13 @@ fn without_one(
         let candidates = candidates(&others, hypotheses, calibration, pattern, &by_pair);
         let now = likeliest(&candidates, others.pairs());
         let causes: Vec<Cause> = now.iter().map(|candidate| candidate.cause()).collect();
-        let first = *causes.first()?;
-        let is_other = equals.iter().all(|candidate| candidate.cause() != first);
-        is_other.then(|| WithoutOne { pair: calibration.views[pair].pair.clone(), words: described(&now), causes })
+        let now_first = *causes.first()?;
+        let is_other = equals.iter().all(|candidate| candidate.cause() != now_first);
+        is_other.then(|| WithoutOne {
+            pair: calibration.views[first[pair]].pair.clone(),
+            words: described(&now),
+            causes,
+        })
     };
     (0..linear.pairs()).into_par_iter().filter_map(without).collect::<Vec<_>>().into_iter().next()
 }

@@ -28,6 +28,8 @@ pub struct Fit {
     pub pairs: usize,
     /// How far these miss it.
     pub missed: Missed,
+    /// Whether the left camera stands to the left; `None` where they do not stand side by side.
+    pub is_left_to_the_left: Option<bool>,
 }
 
 impl Fit {
@@ -91,7 +93,9 @@ pub fn changed(
         let undone = with_right(corners, what, quarters);
         let explains = |fit: &Fit| fit.is_of_most(&undone) && 2.0 * fit.missed.times < missed.times;
         let fit = fitting(&undone).filter(explains)?;
-        Some((fit.missed.times, Error::ChangedSide { what, fit: fit.pairs, of: undone.pairs.len() }))
+        // Undone in the other pictures instead, all is mirrored or turned: the cameras have changed places.
+        let side = fit.is_left_to_the_left.map(|is| if is { Side::Right } else { Side::Left });
+        Some((fit.missed.times, Error::ChangedSide { what, side, fit: fit.pairs, of: undone.pairs.len() }))
     };
     let (turns, open) = (corners.board.turns_of_outline(), corners.board.turns_left_open());
     let with_turns = |&what: &OneSide| turns.iter().map(move |&quarters| (what, quarters));

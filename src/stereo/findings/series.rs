@@ -41,8 +41,9 @@ pub struct Line {
     gradient: DVector<f64>,
     /// Each pair's own information on the amount.
     own: Vec<f64>,
-    /// Patterns that are a nuisance: the board's place.
+    /// Patterns that are a nuisance, the board's place, and the form applied to each.
     places: Vec<DVector<f64>>,
+    places_turned: Vec<DVector<f64>>,
 }
 
 impl Line {
@@ -51,12 +52,14 @@ impl Line {
     pub fn f(&self, pattern: &DVector<f64>) -> (f64, f64) {
         let columns: Vec<&DVector<f64>> = std::iter::once(pattern).chain(&self.places).collect();
         let freedom = |told: usize| (told as f64 - 1.0 - columns.len() as f64).max(1.0);
-        let turned: Vec<DVector<f64>> = columns.iter().map(|c| &self.form * *c).collect();
-        let matrix = DMatrix::from_fn(columns.len(), columns.len(), |a, b| columns[a].dot(&turned[b]));
+        let pattern_turned = &self.form * pattern;
+        let turned: Vec<&DVector<f64>> = std::iter::once(&pattern_turned).chain(&self.places_turned).collect();
+        let matrix = DMatrix::from_fn(columns.len(), columns.len(), |a, b| columns[a].dot(turned[b]));
         let right = DVector::from_fn(columns.len(), |a, _| -columns[a].dot(&self.gradient));
         let Some(inverse) = invert(&matrix) else { return (0.0, freedom(pattern.len())) };
         let amounts = &inverse * right;
-        let left = turned.iter().zip(amounts.iter()).fold(self.gradient.clone(), |left, (t, a)| left + t * *a);
+        let mut left = self.gradient.clone();
+        turned.iter().zip(amounts.iter()).for_each(|(turned, amount)| left.axpy(*amount, turned, 1.0));
         let (squares, told) = sum_of_squares(left.iter().copied().zip(self.own.iter().copied()));
         let freedom = freedom(told);
         let f = amounts[0].powi(2) / inverse[(0, 0)] / (squares / freedom).max(1.0);
@@ -80,6 +83,22 @@ impl Linear {
     pub fn new(problem: &Problem, layout: &Layout) -> Option<Linear> {
         let equations = problem.equations(layout)?;
         Linear::of(&equations.blocks, &equations.prior.matrix, problem)
+    }
+
+    /// The same with pairs that follow on each other counted as one: `first` are the first ones of these.
+    pub fn of_runs(&self, first: &[usize]) -> Linear {
+        let ends = first.iter().skip(1).copied().chain([self.pairs()]);
+        let runs: Vec<_> = first.iter().copied().zip(ends).collect();
+        let middle = |&(a, b): &(usize, usize)| {
+            [0, 1, 2].map(|k| self.places[a..b].iter().map(|place| place[k]).sum::<f64>() / (b - a) as f64)
+        };
+        Linear {
+            matrices: runs.iter().map(|&(a, b)| self.matrices[a..b].iter().sum()).collect(),
+            gradients: runs.iter().map(|&(a, b)| self.gradients[a..b].iter().sum()).collect(),
+            places: runs.iter().map(middle).collect(),
+            inverse: self.inverse.clone(),
+            sum: self.sum.clone(),
+        }
     }
 
     /// The same from the pairs' shares of the normal equations, which may have numbers beyond the shared ones: those
@@ -131,12 +150,10 @@ impl Linear {
         let own: Vec<f64> = products.iter().map(|p| direction.dot(p)).collect();
         let form = DMatrix::from_fn(n, n, |i, j| if i == j { own[i] } else { 0.0 } - products[i].dot(&moved[j]));
         let gradient = DVector::from_fn(n, |i, _| direction.dot(&self.gradients[i]));
-        let places = if n >= PLACES_FROM {
-            (0..3).map(|k| DVector::from_fn(n, |i, _| self.places[i][k])).collect()
-        } else {
-            Vec::new()
-        };
-        Line { form, gradient, own, places }
+        let axes = if n >= PLACES_FROM { 0..3 } else { 0..0 };
+        let places: Vec<DVector<f64>> = axes.map(|k| DVector::from_fn(n, |i, _| self.places[i][k])).collect();
+        let places_turned = places.iter().map(|place| &form * place).collect();
+        Line { form, gradient, own, places, places_turned }
     }
 
     /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not

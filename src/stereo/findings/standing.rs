@@ -11,11 +11,12 @@ use nalgebra::DVector;
 
 use crate::imaging::{Corners, PairCorners};
 use crate::stereo::Error;
-use crate::stereo::calibrate::{Calibration, calibrate, calibrate_by};
+use crate::stereo::calibrate::{Calibration, RigPairs, calibrate};
 use crate::stereo::error::BY_SINCE;
 use crate::stereo::findings::one_side::Fit;
 use crate::stereo::findings::{
-    self, Finding, Kind, common_misfit, hold, one_side, other_rig, own_lenses, rolling_shutter, two_rigs, without_drift,
+    self, Finding, Kind, before_step, common_misfit, hold, one_side, other_rig, own_lenses, rolling_shutter, two_rigs,
+    without_drift,
 };
 use crate::stereo::model::Covariance;
 use crate::stereo::pairs::{Cause, Discarded, DiscardedPair, Standing, fewest_pairs};
@@ -42,7 +43,8 @@ pub struct Asked {
 pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let fitting = |corners: &Corners| {
         let (found, _) = standing(corners, asked).ok()?;
-        Some(Fit { pairs: found.views.len(), missed: common_misfit::missed(&found) })
+        let (missed, rig) = (common_misfit::missed(&found), found.rig());
+        Some(Fit { pairs: found.views.len(), missed, is_left_to_the_left: rig.is_left_to_the_left() })
     };
     let known = asked.options.known.as_ref();
     let explain = |error| one_side::explain(error, corners, known, fitting);
@@ -72,10 +74,11 @@ pub fn calibrate_standing(corners: &Corners, asked: &Asked) -> Result<(Calibrati
 }
 
 fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
-    let mut with_runs = calibrate_by(corners, &asked.options, true, false);
+    let Ok(pairs) = RigPairs::new(corners, &asked.options, true) else { return without_runs(corners, asked, None) };
+    let mut with_runs = pairs.calibrate(false);
     let mut told = with_runs.as_ref().ok().and_then(|found| change(found, asked));
     if with_runs.as_ref().is_ok_and(|found| found.each_alone)
-        && let Some((by_pairs, change)) = by_pairs(corners, asked)
+        && let Some((by_pairs, change)) = by_pairs(&pairs, corners, asked)
     {
         (with_runs, told) = (Ok(by_pairs), Some(change));
     }
@@ -98,8 +101,8 @@ fn standing(corners: &Corners, asked: &Asked) -> Result<(Calibration, Vec<Findin
 /// The rig with the lenses that the pairs tell, and the drift over them, where that alone is why the pairs miss the rig
 /// by more than each camera misses its own pictures: a lens that drifts leaves a picture by itself as good as ever, and
 /// looks like something that moved between the two.
-fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
-    let found = calibrate_by(corners, &asked.options, true, true).ok().filter(|found| found.runs == 0)?;
+fn by_pairs(pairs: &RigPairs, corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> {
+    let found = pairs.calibrate(true).ok().filter(|found| found.runs == 0)?;
     let change = change(&found, asked).filter(|change| change.kind == Kind::Drift)?;
     let still = without_drift::at_share(&found, corners, &asked.options, change.along.as_ref()?, MIDDLE)?;
     (!still.each_alone).then_some((found, change))
@@ -108,12 +111,15 @@ fn by_pairs(corners: &Corners, asked: &Asked) -> Option<(Calibration, Finding)> 
 /// The rig that stands since a step.
 fn stands_since(corners: &Corners, asked: &Asked, later: Later, change: Finding) -> (Calibration, Vec<Finding>) {
     let mut found = later.calibration;
-    let before = dropped(corners, &later.corners, &change);
-    let since = change.pairs.first().cloned();
-    found.standing = Standing { since, pairs_before: before.len(), ..Standing::default() };
+    let (before, is_step) = before_step::left_out(&found, corners, &later.corners, &change);
+    let mut told = Vec::new();
+    if is_step {
+        let since = change.pairs.first().cloned();
+        found.standing = Standing { since, pairs_before: before.len(), ..Standing::default() };
+        told.push(change);
+    }
     trailing(&mut found, corners);
     leave_out(&mut found, before);
-    let mut told = vec![change];
     if let Some(mut further) = later.change {
         stays(&mut found, &mut further, asked, &later.corners);
         told.push(further);
@@ -144,7 +150,7 @@ fn without_runs(corners: &Corners, asked: &Asked, told: Option<Finding>) -> Resu
         let pairs = if at_end { run.clone() } else { found.pair_names() };
         let change = another_rig(told, pairs);
         for discarded in found.discarded.pairs.iter_mut().filter(|d| run.contains(&d.pair)) {
-            *discarded = DiscardedPair::new(&discarded.pair, of_rig(&change), change.action.clone());
+            *discarded = DiscardedPair::new(&discarded.pair, before_step::of_rig(&change), change.action.clone());
         }
         found.skipped = found.discarded.pairs.iter().map(DiscardedPair::skipped).collect();
         if at_end {
@@ -213,11 +219,6 @@ fn another_rig(told: Option<Finding>, pairs: Vec<String>) -> Finding {
     })
 }
 
-/// The cause of pairs that a step left behind.
-fn of_rig(change: &Finding) -> Cause {
-    if change.cause == Cause::Focus.word() { Cause::Focus } else { Cause::CameraMoved }
-}
-
 /// Calibrates from the pairs since one of them, as asked for.
 pub fn calibrate_since(corners: &Corners, pair: &str, asked: &Asked) -> Result<(Calibration, Vec<Finding>), Error> {
     let names = || corners.pairs.iter().map(|p| p.pair.clone()).collect();
@@ -266,7 +267,7 @@ impl Finding {
     }
 
     /// Whether this cause is the one found, or not told apart from it.
-    fn may_be(&self, cause: Cause) -> bool {
+    pub fn may_be(&self, cause: Cause) -> bool {
         self.cause.split('|').any(|word| word == cause.word())
     }
 
@@ -383,13 +384,4 @@ fn trailing(found: &mut Calibration, corners: &Corners) {
 /// Whether a pair is left out because it contradicts the others, by what may be the rig.
 fn is_of_another_rig(found: &Calibration, pair: &PairCorners) -> bool {
     found.discarded.pairs.iter().any(|d| d.pair == pair.pair && d.cause.may_be_the_rig())
-}
-
-/// The pairs of the rig that stood before a step.
-fn dropped(corners: &Corners, kept: &Corners, change: &Finding) -> Vec<DiscardedPair> {
-    let is_kept = |pair: &str| kept.pairs.iter().any(|p| p.pair == pair);
-    let cause = of_rig(change);
-    let reason = format!("the rig changed after it: {}", change.action);
-    let before = corners.pairs.iter().filter(|p| !is_kept(&p.pair));
-    before.map(|p| DiscardedPair::new(&p.pair, cause, reason.clone())).collect()
 }

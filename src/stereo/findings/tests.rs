@@ -1,5 +1,6 @@
 //! Faults planted in the corners of a series: each must be named, and a clean series of any noise must lose nothing.
 
+mod bursts;
 mod lenses;
 
 use nalgebra::Vector3;

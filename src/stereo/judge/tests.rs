@@ -65,6 +65,26 @@ fn changed(mut corners: Corners, change: impl Fn(usize, bool, &mut Corner)) -> C
     corners
 }
 
+/// Two prints of one board in a series: of which the size was said, no pictures tell.
+#[test]
+fn a_rig_since_another_board_may_be_scaled() {
+    const LINE: &str = "board of the rig since it changed";
+    let world = world(14, 5);
+    let changed_to = |other: &World| {
+        let mut corners = world.corners(6);
+        corners.pairs[7..].clone_from_slice(&other.corners(6).pairs[7..]);
+        judge(&corners)
+    };
+    for percent in [-3.0, -0.5, 1.0] {
+        let board = world.board.scaled(1.0 + percent / 100.0);
+        let judged = changed_to(&World { board, ..world.clone() });
+        assert!(judged.verdict != Verdict::Pass, "{percent} %");
+        assert_eq!(line(&judged, LINE).allows, Verdict::Undecided, "{percent} %");
+    }
+    let turned = changed_to(&world.with_camera_moved(Vector3::new(0.0, 2e-3, 0.0), Vector3::zeros()));
+    assert!(turned.evidence.iter().all(|line| line.what != LINE) && turned.verdict == Verdict::Pass);
+}
+
 #[test]
 fn a_tolerance_of_half_a_square_is_no_check() {
     let world = world(12, 1);

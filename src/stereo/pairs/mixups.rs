@@ -71,6 +71,11 @@ const CHANGES: [Change; 4] = [
     Change { cause: Cause::Mirrored, words: "mirrored", mirrors: true, undo: mirror },
 ];
 
+/// That both pictures of a pair were changed so.
+fn both(change: &Change) -> (Cause, String) {
+    (change.cause, format!("both pictures are {}: use the files as the cameras wrote them", change.words))
+}
+
 fn half(p: Point2<f64>, width: f64, height: f64) -> Point2<f64> {
     Point2::new(width - 1.0 - p.x, height - 1.0 - p.y)
 }
@@ -112,6 +117,29 @@ impl Scene<'_> {
         board_pose::fits_within(shared, &turned, limit_px)
     }
 
+    /// What a pair misses the common rig by in the best of its numberings, px.
+    fn misfit_px(&self, view: &View) -> f64 {
+        let of = |quarters| {
+            let mut turned = view.clone();
+            turned.turn_right(self.series.board, quarters);
+            board_pose::misfit_px(self.series.shared, &turned).map_or(f64::INFINITY, |(px, _)| px)
+        };
+        self.series.board.turns_of_outline().into_iter().map(of).fold(f64::INFINITY, f64::min)
+    }
+
+    /// A pair with a change of its pictures on these sides undone.
+    fn undone(&self, view: &View, change: &Change, sides: &[Side]) -> View {
+        let mut undone = view.clone();
+        for o in undone.observations.iter_mut().filter(|o| sides.contains(&o.side)) {
+            let camera = self.series.shared.rig.camera(o.side);
+            o.px = (change.undo)(o.px, f64::from(camera.width), f64::from(camera.height));
+            if change.mirrors {
+                o.renumber(self.series.board, (o.col, self.series.board.rows() - 1 - o.row));
+            }
+        }
+        undone
+    }
+
     /// What was done to the pair's own files.
     fn files(&self, i: usize) -> Option<(Cause, String)> {
         let (shared, view) = (self.series.shared, &self.views[i]);
@@ -120,27 +148,28 @@ impl Scene<'_> {
             let reason = "the corners are numbered from another end of the board in the right picture than in the left";
             return Some((Cause::Numbering, reason.to_owned()));
         }
-        if self.fits(shared, &view.exchanged(), 1.0) {
+        let exchanged = view.exchanged();
+        if self.fits(shared, &exchanged, 1.0) {
+            // Of cameras that stand alike both pictures turned are nearly the same as both exchanged.
+            let turned = self.undone(view, &CHANGES[0], &Side::BOTH);
+            if self.misfit_px(&turned) < FITS_WELL * self.misfit_px(&exchanged) {
+                return Some(both(&CHANGES[0]));
+            }
             let reason = "left and right picture are exchanged: give each the other's name";
             return Some((Cause::Exchanged, reason.to_owned()));
         }
         for side in Side::BOTH {
-            let camera = shared.rig.camera(side);
-            let (width, height) = (f64::from(camera.width), f64::from(camera.height));
             for change in &CHANGES {
-                let mut undone = view.clone();
-                for o in undone.observations.iter_mut().filter(|o| o.side == side) {
-                    o.px = (change.undo)(o.px, width, height);
-                    if change.mirrors {
-                        o.renumber(self.series.board, (o.col, self.series.board.rows() - 1 - o.row));
-                    }
-                }
-                if self.fits(shared, &undone, FITS_WELL) {
+                if self.fits(shared, &self.undone(view, change, &[side]), FITS_WELL) {
                     let (side, words) = (side.name(), change.words);
                     let reason = format!("the {side} picture is {words}: use the file as the camera wrote it");
                     return Some((change.cause, reason));
                 }
             }
+        }
+        let of_both = CHANGES.iter().find(|c| self.fits(shared, &self.undone(view, c, &Side::BOTH), FITS_WELL));
+        if let Some(change) = of_both {
+            return Some(both(change));
         }
         let misread = |side: &Side| {
             let known = self.series.alone_px[*side as usize][i].is_some_and(|px| px <= self.series.limit_px);
@@ -248,6 +277,19 @@ mod tests {
                 let (w, h) = (f64::from(world.rig.left.width), f64::from(world.rig.left.height));
                 let rows = world.board.rows();
                 change(&mut corners.pairs[2].right, |c| Corner { px: mirror(c.px, w, h), row: rows - 1 - c.row, ..*c });
+            });
+        }
+    }
+
+    #[test]
+    fn both_pictures_of_a_pair_turned() {
+        for squares in BOARDS {
+            one(squares, "06", "both pictures are turned by 180 degrees", |world, corners| {
+                let (w, h) = (f64::from(world.rig.left.width), f64::from(world.rig.left.height));
+                let pair = &mut corners.pairs[6];
+                for picture in [&mut pair.left, &mut pair.right] {
+                    change(picture, |c| Corner { px: half(c.px, w, h), ..*c });
+                }
             });
         }
     }

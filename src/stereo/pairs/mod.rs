@@ -2,6 +2,7 @@
 
 pub mod candidates;
 pub mod discarded;
+pub mod flip;
 pub mod mixups;
 mod moved;
 pub mod numbering;

@@ -20,15 +20,16 @@ use self::looks::Looks;
 pub use self::looks::{CauseSeen, Explained};
 pub use self::strays::Stray;
 use crate::difference::Difference;
-use crate::imaging::{Board, Corners, Skipped};
+use crate::imaging::{Board, Corners, PairCorners, Skipped};
 use crate::stereo::Error;
 use crate::stereo::board_pose::pair_excess::Usual;
-use crate::stereo::data::{Noise, View, in_use};
+use crate::stereo::data::{Noise, in_use};
 use crate::stereo::findings::hypothesis;
 use crate::stereo::init::board_pose::{self, misfit_px};
 use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::rig::Rig;
 use crate::stereo::model::{KnownLenses, Layout, Shared, Values};
+use crate::stereo::pairs::flip::Flip;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::scatter_beside;
@@ -83,9 +84,13 @@ pub struct Recheck {
 
 pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     before.rig.check_size(corners)?;
-    let (problem, mut skipped, exchanged) = start(before, corners);
-    if problem.views.is_empty() && exchanged >= FEWEST_PAIRS {
-        return Err(Error::Exchanged);
+    let (problem, mut skipped, other_way_round) = start(before, corners);
+    if problem.views.is_empty()
+        && other_way_round.len() >= FEWEST_PAIRS
+        && let Some(&flipped) = other_way_round.first()
+        && other_way_round.iter().all(|other| *other == flipped)
+    {
+        return Err(Error::OtherWayRound { flipped: flipped.map(Flip::describe) });
     }
     if problem.views.len() < FEWEST_PAIRS {
         let total = corners.pairs.len() + corners.skipped.len();
@@ -163,14 +168,19 @@ fn strays(
     strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 
-/// Whether a pair comes several times nearer to the old rig with its pictures exchanged: no knock moves a camera to the
-/// other side.
-fn is_exchanged(shared: &Shared, board: &Board, view: &View) -> bool {
+/// How a pair is the other way round that comes several times nearer to the old rig with its pictures exchanged
+/// (`None` within), or turned or mirrored back: no knock moves a camera to the other side.
+fn other_way_round(before: &Before, board: &Board, shared: &Shared, pair: &PairCorners) -> Option<Option<Flip>> {
     const SEVERAL: f64 = 4.0;
-    let mut other = view.exchanged();
-    other.turn_right(board, numbering::on_rig(shared, board, &other).unwrap_or(0));
-    let miss_px = |view: &View| misfit_px(shared, view).map_or(f64::INFINITY, |(px, _)| px);
-    SEVERAL * miss_px(&other) < miss_px(view)
+    let miss_px = |pair: &PairCorners| {
+        let view = numbering::seen_on_rig(shared, board, pair, before.noise.as_ref());
+        misfit_px(shared, &view).map_or(f64::INFINITY, |(px, _)| px)
+    };
+    let exchanged = PairCorners { pair: pair.pair.clone(), left: pair.right.clone(), right: pair.left.clone() };
+    let flipped = Flip::ALL.map(|flip| (miss_px(&flip.of_pair(board, &before.rig, pair)), Some(flip)));
+    let all = std::iter::once((miss_px(&exchanged), None)).chain(flipped);
+    let (px, how) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    (SEVERAL * px < miss_px(pair)).then_some(how)
 }
 
 /// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the
@@ -187,29 +197,32 @@ fn step_from_old(solved: &Solved, old: &Values, layout: &Layout) -> Option<(DVec
 }
 
 /// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for; those that are
-/// left out, and of how many of these the pictures are exchanged.
-fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, usize) {
+/// left out, and of which of these the pictures are the other way round.
+fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, Vec<Option<Flip>>) {
     let shared = Shared { rig: before.rig.clone(), shape_mm: FLAT };
     let mut skipped = corners.skipped.clone();
-    let (mut views, mut poses, mut exchanged) = (Vec::new(), Vec::new(), 0);
+    let (mut views, mut poses, mut turned) = (Vec::new(), Vec::new(), Vec::new());
     for pair in &corners.pairs {
         let view = numbering::seen_on_rig(&shared, &corners.board, pair, before.noise.as_ref());
-        let mut skip = |reason: &str| skipped.push(Skipped { pair: pair.pair.clone(), reason: reason.to_owned() });
-        match misfit_px(&shared, &view) {
-            Some(_) if is_exchanged(&shared, &corners.board, &view) => {
-                exchanged += 1;
-                skip("left and right picture are exchanged: give each the other's name");
-            }
-            Some((_, pose)) => {
-                views.push(view);
-                poses.push(pose);
-            }
-            None => skip("its corners give no pose of the board on this rig"),
+        let mut skip = |reason: String| skipped.push(Skipped { pair: pair.pair.clone(), reason });
+        let Some((_, pose)) = misfit_px(&shared, &view) else {
+            skip("its corners give no pose of the board on this rig".to_owned());
+            continue;
+        };
+        if let Some(how) = other_way_round(before, &corners.board, &shared, pair) {
+            turned.push(how);
+            skip(match how {
+                None => "left and right picture are exchanged: give each the other's name".to_owned(),
+                Some(flip) => format!("its pictures are {}: use them as the cameras wrote them", flip.describe()),
+            });
+            continue;
         }
+        views.push(view);
+        poses.push(pose);
     }
     let known = KnownLenses::of_cameras([Some(before.rig.left), Some(before.rig.right)]).loosened();
     let priors = Priors::of_rig(&before.rig, corners.board.diagonal_mm()).knowing(&known);
-    (Problem { views, values: Values { shared, poses }, priors }, skipped, exchanged)
+    (Problem { views, values: Values { shared, poses }, priors }, skipped, turned)
 }
 
 impl Before {

@@ -221,7 +221,29 @@ fn a_pair_with_its_pictures_exchanged_is_left_out_and_named() {
     assert!(skipped.pair == corners.pairs[1].pair && skipped.reason.contains("exchanged"), "{skipped:?}");
     assert!(found.change.is_none() && found.pairs.len() == 2);
     [0, 2].into_iter().for_each(|at| exchange(&mut corners, at));
-    assert!(matches!(recheck(&before, &corners), Err(Error::Exchanged)));
+    assert!(matches!(recheck(&before, &corners), Err(Error::OtherWayRound { flipped: None })));
+}
+
+/// A driver that turns or mirrors what both cameras see, for one pair or for all.
+#[test]
+fn pictures_that_are_turned_or_mirrored_are_named() {
+    let before = calibrated(43);
+    let clean = after(43, |_| {});
+    for flip in Flip::ALL {
+        let turned = |at: &[usize]| {
+            let mut corners = clean.clone();
+            at.iter().for_each(|&at| {
+                corners.pairs[at] = flip.of_pair(&clean.board, &before.rig, &clean.pairs[at]);
+            });
+            recheck(&before, &corners)
+        };
+        let said = turned(&[0, 1, 2]);
+        let is_named = matches!(said, Err(Error::OtherWayRound { flipped: Some(how) }) if how == flip.describe());
+        assert!(is_named, "{said:?}");
+        let found = turned(&[1]).unwrap();
+        let [skipped] = &found.skipped[..] else { panic!("{:?}", found.skipped) };
+        assert!(skipped.reason.contains(flip.describe()) && found.change.is_none(), "{skipped:?}");
+    }
 }
 
 #[test]

@@ -10,6 +10,8 @@
 //! and beside it those that do nearly as well. Goes wrong: pictures that say little of a lens; then the test says how
 //! large a change of focus it would have seen.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use crate::difference::{Difference, SEEN, TOLD_APART};
@@ -86,6 +88,7 @@ pub fn choose(start: &Problem, known: &KnownLenses, options: &Options) -> Result
         priors: solved.problem.priors,
         scatter: Some(KnownScatter { lenses: scatter, pairs: scatter, motion: motion(start, known) }),
         scores: Vec::new(),
+        solved: Arc::default(),
     })
 }
 

@@ -9,6 +9,8 @@
 //! wrong: pairs too few or too alike to tell models apart; then the simplest that fits wins, and
 //! [`crate::stereo::judge::lengths::model_disagreement`] says what is at stake.
 
+use std::sync::Arc;
+
 use crate::imaging::Board;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::model::Layout;
@@ -23,10 +25,11 @@ use crate::stereo::{Error, Lens};
 
 /// Chooses what is free, where it is not forced. Where each camera alone tells more of its lens than the pairs, whose
 /// pictures were not taken at one moment, the lenses are expected to be those; which model, the pairs say, where they
-/// say anything. `missed` is how far pictures are missed, where that may decide; `below` is a lens that turned out to
-/// be richer than the pairs determine.
+/// say anything. `of_pairs` is what the pairs choose; `missed` is how far pictures are missed, where that may decide;
+/// `below` is a lens that turned out to be richer than the pairs determine.
 pub fn choose(
     start: &Problem,
+    of_pairs: impl FnOnce() -> Result<Choice, Error>,
     missed: Option<Missed>,
     board: &Board,
     options: &Options,
@@ -35,7 +38,7 @@ pub fn choose(
     if let Some(known) = &options.known {
         return known_lenses::choose(start, known, options);
     }
-    let of_pairs = of_pairs(start, board, options).map(|choice| choice.below(below));
+    let of_pairs = of_pairs().map(|choice| choice.below(below));
     let Some(missed) = missed.filter(Missed::is_better_alone) else { return of_pairs };
     let chosen = of_pairs.as_ref().ok();
     let lens = chosen.and_then(|choice| choice.layout.left).unwrap_or(SIMPLEST);
@@ -48,12 +51,15 @@ pub fn choose(
     Ok(Choice { scores, scatter, ..choice })
 }
 
-fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
+/// What the pairs choose, whatever each camera alone tells.
+pub fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice, Error> {
+    let choice =
+        |layout, near, priors, scores| Choice { layout, near, priors, scatter: None, scores, solved: Arc::default() };
     let forced_shape = options.shape.or(options.lens.map(|_| false));
     if let (Some(lens), Some(shape)) = (options.lens, forced_shape) {
         let layout = Layout::rig(lens, shape);
         let priors = priors_of_forced(start, &layout);
-        return Ok(Choice { layout, near: None, priors, scatter: None, scores: Vec::new() });
+        return Ok(choice(layout, None, priors, Vec::new()));
     }
     // Weights from a model that is at least as rich as most need; the comparison uses the same for all.
     let simple = start.solve_bent_or_flat(forced_shape, |shape| Layout::rig(SIMPLEST, shape));
@@ -85,11 +91,11 @@ fn of_pairs(start: &Problem, board: &Board, options: &Options) -> Result<Choice,
     let Some(chosen) = simplest(&scores, &chance) else {
         // Some pairs cannot be left out without losing the cameras: nothing can be compared.
         let priors = solved.problem.priors.clone();
-        return Ok(Choice { layout, near: Some(solved.problem.values), priors, scatter: None, scores: Vec::new() });
+        return Ok(choice(layout, Some(solved.problem.values), priors, Vec::new()));
     };
     let fewer = fewer_terms(&solved.problem, chosen, &chance);
     let Trial { layout, values, priors, .. } = fewer.as_ref().unwrap_or(chosen).clone();
-    Ok(Choice { layout, near: Some(values), priors, scatter: None, scores })
+    Ok(choice(layout, Some(values), priors, scores))
 }
 
 fn print_excess(solved: &Solved, layout: &Layout, board: &Board) -> f64 {

@@ -1,5 +1,7 @@
 //! What may be forced or known of lens and board, and what was chosen.
 
+use std::sync::{Arc, OnceLock};
+
 use crate::stereo::model::{KnownLenses, Layout, Values};
 use crate::stereo::select::model_comparison::{LensScore, Trial};
 use crate::stereo::select::pair_motion::KnownMotion;
@@ -44,14 +46,21 @@ pub struct Choice {
     pub scatter: Option<KnownScatter>,
     /// Every lens of the ladder; empty where the lens was forced.
     pub scores: Vec<LensScore>,
+    /// The pairs with it, once they were solved; copies share it.
+    pub solved: Arc<OnceLock<Solved>>,
 }
 
 impl Choice {
-    /// The pairs with what was chosen for them.
+    /// The pairs with what was chosen for them, which `start` holds.
     pub fn solve(&self, start: &Problem) -> Result<Solved, Error> {
+        if let Some(solved) = self.solved.get() {
+            return Ok(solved.clone());
+        }
         let values = self.near.clone().unwrap_or_else(|| start.values.clone());
-        Problem { values, priors: self.priors.clone(), views: start.views.clone() }.solve(&self.layout)
+        let solved = Problem { values, priors: self.priors.clone(), views: start.views.clone() }.solve(&self.layout)?;
+        Ok(self.solved.get_or_init(|| solved).clone())
     }
+
     /// The same where its lens is simpler than this one, or else the richest that is.
     pub fn below(self, lens: Option<Lens>) -> Choice {
         let is_below = lens.is_none() || self.layout.left < lens;
@@ -64,6 +73,6 @@ impl Choice {
         let simpler =
             tried.filter(|trial| trial.layout.left < self.layout.left).max_by_key(|trial| trial.layout.left)?;
         let Trial { layout, values, priors, .. } = simpler.clone();
-        Some(Choice { layout, near: Some(values), priors, ..self.clone() })
+        Some(Choice { layout, near: Some(values), priors, solved: Arc::default(), ..self.clone() })
     }
 }

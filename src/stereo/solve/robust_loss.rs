@@ -39,6 +39,18 @@ impl Loss {
         }
     }
 
+    /// The slope along a residual over the weight by which steps of a search near the minimum bend: so they end after
+    /// some, where the weight alone, which overestimates it, takes many times as many (Triggs et al. 2000, section
+    /// 4.3). Cauchy's loss is for searches from afar, where the weight leads down surely.
+    pub fn bend_along(self, weighed: f64) -> f64 {
+        /// A step stays finite where corners far off would bend the other way.
+        const LEAST: f64 = 0.1;
+        match self {
+            Loss::Squared | Loss::Cauchy => 1.0,
+            Loss::Student(_) => self.slope_along(weighed).max(LEAST),
+        }
+    }
+
     /// Variance of an estimate over the inverse of the weighted normal equations, `J' W J` with the weights that these
     /// squared residuals have: the sandwich of an M-estimator with two-dimensional residuals (Huber 1981, section 7.6).
     /// One for least squares.

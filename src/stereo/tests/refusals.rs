@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::geometry::{Transform, rotation_vector, transform};
-use crate::imaging::{Corner, Skipped};
+use crate::imaging::{Corner, Side, Skipped};
 use crate::stereo::Error;
 use crate::stereo::error::OneSide;
 use crate::stereo::findings::standing::{Asked, calibrate_standing};
@@ -115,6 +115,26 @@ fn a_side_whose_pictures_are_all_mirrored_or_inverted_is_named() {
             *pose = transform(rotation_vector(pose) * share, Vector3::new(at.x, share * at.y, at.z));
         }
         are_named(&world, share);
+    }
+}
+
+/// The left camera stands to the left with that undone in the pictures of the side that it happened to.
+#[test]
+fn the_side_that_is_mirrored_is_told_by_where_the_cameras_stand() {
+    let world = World::new(9, 13);
+    for side in Side::BOTH {
+        let mut corners = world.corners(14);
+        for pair in &mut corners.pairs {
+            let picture = if side == Side::Left { &mut pair.left } else { &mut pair.right };
+            for corner in picture.iter_mut() {
+                corner.px.x = f64::from(world.rig.camera(side).width) - 1.0 - corner.px.x;
+                corner.row = world.board.rows() - 1 - corner.row;
+            }
+            picture.sort_by_key(|corner| (corner.row, corner.col));
+        }
+        let said = calibrate_standing(&corners, &asked()).map(|(found, _)| found.rms_px());
+        let is_told = matches!(&said, Err(Error::ChangedSide { side: told, .. }) if *told == Some(side));
+        assert!(is_told && said.unwrap_err().to_string().contains(side.name()), "{side:?}");
     }
 }
 

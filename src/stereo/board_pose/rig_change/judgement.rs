@@ -4,8 +4,8 @@ use crate::diagnostic::two_digits;
 use crate::imaging::Board;
 use crate::stereo::Rig;
 use crate::stereo::board_pose::rig_change::cause::{Cause, Explanation};
-use crate::stereo::board_pose::rig_change::flip::Flip;
 use crate::stereo::board_pose::rig_change::judge::Changed;
+use crate::stereo::pairs::flip::Flip;
 
 #[derive(Debug, Clone, Default, PartialEq)]
 pub enum Judgement {

@@ -2,13 +2,12 @@
 //! run.
 //!
 //! `consistency` finds poses and moments at which the rig is another, `judge` fits every `cause` of a change of the
-//! whole run, `flip` is of pictures that are the other way round, `elsewhere` of a right camera that stands anywhere
-//! else, `ending` ends the run where the points are off by more than they may be, and a `judgement` says it in words.
+//! whole run, `elsewhere` is of a right camera that stands anywhere else, `ending` ends the run where the points are off
+//! by more than they may be, and a `judgement` says it in words.
 
 pub mod cause;
 pub(in crate::stereo::board_pose) mod consistency;
 pub(in crate::stereo::board_pose) mod elsewhere;
 mod ending;
-pub mod flip;
 pub mod judge;
 pub mod judgement;

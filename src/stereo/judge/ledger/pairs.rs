@@ -6,8 +6,8 @@ use crate::diagnostic::two_digits;
 use crate::imaging::Side;
 use crate::stereo::Camera;
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::Finding;
 use crate::stereo::findings::standing::MATERIAL_SHARE;
+use crate::stereo::findings::{Finding, Kind};
 use crate::stereo::judge::evidence::Evidence;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::Cause;
@@ -106,6 +106,25 @@ pub(super) fn standing(case: &Case) -> Evidence {
     };
     let (what, remedy) = ("last pairs that contradict the rig", "add pairs of the rig as it stands");
     Evidence::of_doubt(what, remedy, [after.len() as f64, 0.0], "", after.is_empty(), detail)
+}
+
+/// A rig since a step that may as well be one of the board: of two boards one has another size than was said, and no
+/// pictures tell which.
+pub(super) fn board_since(case: &Case) -> Option<Evidence> {
+    let since = case.calibration.standing.since.as_ref()?;
+    let may_be_board = |finding: &&Finding| {
+        finding.kind == Kind::Step && finding.pairs.first() == Some(since) && finding.may_be(Cause::OtherBoard)
+    };
+    let finding = case.facts.findings.iter().find(may_be_board)?;
+    let detail = format!(
+        "{}. If the boards before and since are two, one of them is not as large as was said, and whether it is this one no pictures tell; all \
+         lengths are off with it. If one board was photographed throughout, nothing is",
+        finding.action
+    );
+    let remedy =
+        "measure the squares of the board that was photographed since then, and name its first pair with `--since`";
+    let figures = [finding.effect_mm.unwrap_or(f64::INFINITY), MATERIAL_SHARE * case.facts.tolerance_mm];
+    Some(Evidence::of_doubt("board of the rig since it changed", remedy, figures, "mm", false, detail))
 }
 
 pub(super) fn poses(case: &Case) -> Evidence {

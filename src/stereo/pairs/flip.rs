@@ -1,6 +1,7 @@
 //! Pictures that are the other way round: a camera or a program mirrors them, or turns them by half a turn.
 
-use crate::imaging::{Board, Corner};
+use crate::imaging::{Board, Corner, PairCorners};
+use crate::stereo::Rig;
 
 /// How pictures are the other way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,8 +25,15 @@ impl Flip {
         }
     }
 
+    /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
+    pub fn of_pair(self, board: &Board, rig: &Rig, pair: &PairCorners) -> PairCorners {
+        let [left, right] = [(&rig.left, &pair.left), (&rig.right, &pair.right)]
+            .map(|(camera, corners)| self.of(board, [camera.width, camera.height], corners));
+        PairCorners { pair: pair.pair.clone(), left, right }
+    }
+
     /// Corners as they are in the other picture, of this width and height, numbered as they would be found there.
-    pub fn of(self, board: &Board, [width, height]: [u32; 2], corners: &[Corner]) -> Vec<Corner> {
+    fn of(self, board: &Board, [width, height]: [u32; 2], corners: &[Corner]) -> Vec<Corner> {
         let (x, y) = (self != Flip::UpsideDown, self != Flip::Mirrored);
         let flip = |corner: &Corner| {
             let mut corner = *corner;
