@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 use super::{checked, export};
-use crate::diagnostic::at_most;
+use crate::diagnostic::{at_most, two_digits};
 use crate::files::{self, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
@@ -14,7 +14,7 @@ use crate::progress;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::judge::assessment::Judged;
+use crate::stereo::judge::assessment::{Judged, NO_USE};
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::rig::{Covariance, Rig};
@@ -132,11 +132,19 @@ impl Calibrated {
         });
         let failed = self.check.filter(|check| check.verdict != Verdict::Pass).map(|check| {
             let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
-            let up_to = check.length_mm.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
-            let trusted = self.trusted_mm().map_or_else(
-                || "to what its lengths can be trusted is not known".to_owned(),
-                |mm| format!("lengths{up_to} can be trusted to {} mm", at_most(mm, f64::INFINITY)),
-            );
+            let trusted = match (self.trusted_mm(), check.length_mm) {
+                (None, _) => "to what its lengths can be trusted is not known".to_owned(),
+                (Some(mm), Some(length_mm)) if mm > NO_USE * length_mm => {
+                    format!(
+                        "no length can be trusted: of one of {length_mm:.0} mm an error of {} mm is not ruled out",
+                        two_digits(mm)
+                    )
+                }
+                (Some(mm), length_mm) => {
+                    let up_to = length_mm.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
+                    format!("lengths{up_to} can be trusted to {} mm", at_most(mm, f64::INFINITY))
+                }
+            };
             format!(
                 "this rig did not pass its check ({verdict} at a tolerance of {} mm): {trusted}",
                 check.tolerance_mm

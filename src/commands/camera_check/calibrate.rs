@@ -196,13 +196,15 @@ fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Resu
         return Ok((warm(args, drawn)?, None));
     };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
+    // Of a size that nobody gave the extent alone tells it.
+    let is_assumed = config.check_board.size_is_assumed(args.board, args.square_mm).is_some();
+    let drawn = if is_assumed { extent.scaled(&drawn) } else { drawn };
     let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
     let [measured, said] = [board, drawn].map(|board| board.side_said());
-    // Of a size that nobody gave nothing was said.
-    let said = match config.check_board.size_is_assumed(args.board, args.square_mm) {
-        Some(_) => String::new(),
-        None if measured == said => ", as was said".to_owned(),
-        None => format!(", not {said} mm"),
+    let said = match is_assumed {
+        true => String::new(),
+        false if measured == said => ", as was said".to_owned(),
+        false => format!(", not {said} mm"),
     };
     progress::note(format!(
         "by its measured extent the board has {} of {measured} mm{said}; by a caliper, to {uncertainty_mm:.4} mm in all",

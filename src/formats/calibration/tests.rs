@@ -92,6 +92,10 @@ fn a_rig_that_did_not_pass_says_so_to_those_who_use_it() {
         doubts(Some((Verdict::Fail, Some(1.3538))), &[]),
         "this rig did not pass its check (FAIL at a tolerance of 0.05 mm): lengths of up to 70 mm can be trusted to 1.36 mm"
     );
+    assert!(
+        doubts(Some((Verdict::Fail, Some(21.2))), &[])
+            .ends_with("no length can be trusted: of one of 70 mm an error of 21 mm is not ruled out")
+    );
     let open = doubts(Some((Verdict::Undecided, None)), &["0017"]);
     assert!(open.contains("from pair 0017 on") && open.ends_with("can be trusted is not known"), "{open}");
 }

@@ -48,6 +48,12 @@ pub struct Printed {
 }
 
 impl PrintedExtent {
+    /// A board as large as this extent, whatever size it has.
+    pub fn scaled(&self, board: &Board) -> Board {
+        let [width, height] = board.extent_mm();
+        board.scaled((self.mm[0] + self.mm[1]) / (width + height))
+    }
+
     /// The board with this extent; the reason where it is not the extent of it.
     pub fn of(&self, board: &Board) -> Result<Printed, String> {
         let whole = board.extent_mm();
@@ -184,6 +190,14 @@ mod tests {
         let square = measured("checker:10x10:15", "149.7x150.1").unwrap();
         assert!(square.board.stretch == 1.0 && (square.board.square_mm - 14.99).abs() < 1e-12);
         assert!((square.uncertainty_mm - 0.28).abs() < 1e-9, "{}", square.uncertainty_mm);
+    }
+
+    #[test]
+    fn of_a_size_that_nobody_gave_the_extent_alone_tells_it() {
+        let extent: PrintedExtent = "266.5x210".parse().unwrap();
+        let said = "checker:9x7:30".parse().unwrap();
+        let nobody = extent.scaled(&"checker:9x7:10".parse().unwrap());
+        assert_eq!(extent.of(&nobody).unwrap(), extent.of(&said).unwrap());
     }
 
     #[test]

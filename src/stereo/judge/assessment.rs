@@ -15,6 +15,9 @@ use crate::stereo::solve::priors::BOW_SHARE;
 use crate::stereo::volume::Extent;
 use crate::stereo::volume::lengths::VolumeLengths;
 
+/// Lengths that may be off by such a share of themselves are not measured.
+pub const NO_USE: f64 = 0.1;
+
 /// A calibration with everything that was asked of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
@@ -115,7 +118,6 @@ impl Judged {
 
     /// Whether lengths may be off by such a share of themselves that the rig measures nothing.
     pub fn measures_nothing(&self) -> bool {
-        const NO_USE: f64 = 0.1;
         self.trusted_mm().is_some_and(|mm| mm > NO_USE * self.facts.volume.length_mm)
     }
 
