@@ -1,11 +1,13 @@
 //! `calibration.json`: a rig as a file.
 
+mod check;
+
 use camino::{Utf8Path, Utf8PathBuf};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
+pub use self::check::Check;
 use super::{checked, export};
-use crate::diagnostic::{at_most, two_digits};
 use crate::files::{self, Result};
 use crate::geometry::rotation_matrix;
 use crate::imaging::Board;
@@ -14,9 +16,8 @@ use crate::progress;
 use crate::stereo::board_pose::pair_excess::{farthest_pair, pair_excess};
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::corner_noise::Noise;
-use crate::stereo::judge::assessment::{Judged, NO_USE};
+use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::moves::KnownMove;
-use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::model::rig::{Covariance, Rig};
 use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Lens};
@@ -79,20 +80,6 @@ struct BoardsRecord {
     farthest_mm: f64,
 }
 
-/// How the check of the rig's lengths ended.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-pub struct Check {
-    verdict: Verdict,
-    /// The largest error of a length that passed, mm.
-    pub tolerance_mm: f64,
-    /// What lengths can be trusted to; none where something else than a length stands against the rig.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    trusted_mm: Option<f64>,
-    /// Up to which length, mm.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    length_mm: Option<f64>,
-}
-
 /// A rig and what its calibration says beside it; files made elsewhere do not say that.
 #[derive(Debug, Clone)]
 pub struct Calibrated {
@@ -117,12 +104,12 @@ pub struct Calibrated {
 impl Calibrated {
     /// Whether the check of its lengths ended with FAIL.
     pub fn has_failed(&self) -> bool {
-        self.check.is_some_and(|check| check.verdict == Verdict::Fail)
+        self.check.is_some_and(|check| check.has_failed())
     }
 
     /// What lengths can be trusted to by its own calibration, mm.
     pub fn trusted_mm(&self) -> Option<f64> {
-        self.check?.trusted_mm.filter(|mm| mm.is_finite())
+        self.check?.trusted_mm()
     }
 
     /// What its own calibration says against the rig, for those who use it.
@@ -130,27 +117,7 @@ impl Calibrated {
         let changed = self.unconfirmed.first().map(|last| {
             format!("the calibration's last pairs contradict it (from pair {last} on): the rig may have changed since. Calibrate it as it is now")
         });
-        let failed = self.check.filter(|check| check.verdict != Verdict::Pass).map(|check| {
-            let verdict = if check.verdict == Verdict::Fail { "FAIL" } else { "UNDECIDED" };
-            let trusted = match (self.trusted_mm(), check.length_mm) {
-                (None, _) => "to what its lengths can be trusted is not known".to_owned(),
-                (Some(mm), Some(length_mm)) if mm > NO_USE * length_mm => {
-                    format!(
-                        "no length can be trusted: of one of {length_mm:.0} mm an error of {} mm is not ruled out",
-                        two_digits(mm)
-                    )
-                }
-                (Some(mm), length_mm) => {
-                    let up_to = length_mm.map_or_else(String::new, |mm| format!(" of up to {mm:.0} mm"));
-                    format!("lengths{up_to} can be trusted to {} mm", at_most(mm, f64::INFINITY))
-                }
-            };
-            format!(
-                "this rig did not pass its check ({verdict} at a tolerance of {} mm): {trusted}",
-                check.tolerance_mm
-            )
-        });
-        changed.into_iter().chain(failed).collect()
+        changed.into_iter().chain(self.check.and_then(|check| check.doubt())).collect()
     }
 }
 

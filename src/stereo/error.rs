@@ -337,7 +337,7 @@ impl Explain for Error {
                     "name the left camera's pictures first; if the cameras themselves changed places, calibrate anew"
                 }
                 Error::OtherWayRound { flipped: Some(_) } => {
-                    "use the pictures of both cameras as these wrote them when they were calibrated"
+                    "take them with the settings of the cameras with which these were calibrated, or calibrate anew"
                 }
                 Error::OutOfView { boards_mm: [[x0, y0, z0], [x1, y1, z1]] } => {
                     return Some(format!(

@@ -79,7 +79,7 @@ fn the_same_pictures_give_the_same_rig_whatever_their_names() {
     }
     // Exchanged by name: the geometry says so.
     let (_, said) = check(&["cams/cam2", "cams/cam1"], "exchanged");
-    assert!(said.contains("are left and right exchanged, or do both cameras hang upside down?"), "{said}");
+    assert!(said.contains("are left and right exchanged, are the pictures of both cameras mirrored"), "{said}");
 }
 
 #[test]

@@ -1,5 +1,6 @@
 use super::*;
 use crate::geometry::transform;
+use crate::stereo::judge::verdict::Verdict;
 
 /// Two plain cameras side by side, one of whose numbers is uncertain.
 fn plain() -> Rig {

@@ -2,9 +2,9 @@
 //!
 //! In: the rig of the pairs since, and the corners of all. Out: the others with their cause. Method: pictures that were
 //! exchanged, turned or mirrored up to some pair make two rigs as well as a camera that moved does; each pair before is
-//! tried as single pairs of a series are ([`crate::stereo::pairs::mixups`]), and where most fit the rig the other way
-//! round, that is why. Which part is named as it should be only the place of the cameras tells. Goes wrong: cameras
-//! that changed places in between.
+//! tried as single pairs of a series are ([`crate::stereo::pairs::mixups`]), and where most miss the rig as they are and
+//! fit it the other way round, that is why. Which part is named as it should be only the place of the cameras tells.
+//! Goes wrong: cameras that changed places in between.
 
 use super::one_side::MOST;
 use crate::imaging::{Corners, PairCorners, Side};
@@ -49,16 +49,29 @@ fn the_other_way_round(found: &Calibration, corners: &Corners, before: &[Discard
     let is_before = |view: &View| before.iter().any(|pair| pair.pair == view.pair);
     let strays: Vec<usize> = (0..views.len()).filter(|&i| is_before(&views[i])).collect();
     let usual_px = median(found.views.iter().filter_map(|view| Some(misfit_px(shared, view)?.0)))?;
+    let limit_px = SEVERAL * usual_px;
+    let is_off = |i: &usize| misfit_px(shared, &views[*i]).is_none_or(|(px, _)| px > limit_px);
     let alone_px = Side::BOTH.map(|side| vec![Some(found.alone_px[side as usize]); views.len()]);
     let alone_px = [alone_px[0].as_slice(), alone_px[1].as_slice()];
-    let series = Series { shared, board: &found.board, views: &views, alone_px, limit_px: SEVERAL * usual_px };
+    let series = Series { shared, board: &found.board, views: &views, alone_px, limit_px };
     let is_way_round =
         |(cause, _): &(Cause, String)| matches!(cause, Cause::Exchanged | Cause::Turned | Cause::Mirrored);
-    let why = mixups::explain(&series, &strays).into_iter().map(|why| why.filter(is_way_round));
+    let why = mixups::explain(&series, &strays).into_iter().zip(&strays);
+    let why = why.map(|(why, i)| why.filter(|why| is_off(i) && is_way_round(why)));
     let why: Vec<(&DiscardedPair, Option<(Cause, String)>)> = before.iter().zip(why).collect();
     let told = why.iter().filter(|(_, why)| why.is_some()).count();
+    let is_exchanged = found.rig().is_left_to_the_left() == Some(false);
     let discarded = |(pair, why): (&DiscardedPair, Option<(Cause, String)>)| {
-        why.map_or_else(|| pair.clone(), |(cause, reason)| DiscardedPair::new(&pair.pair, cause, reason))
+        let (cause, reason) = match why {
+            Some((Cause::Exchanged, _)) if is_exchanged => {
+                let reason = "left and right are named the other way round than in the pairs of the rig, in which the left camera stands to the \
+                              right: exchange the names of one part, probably of those";
+                (Cause::Exchanged, reason.to_owned())
+            }
+            Some(why) => why,
+            None => (Cause::Unknown, "it fits the rig neither as it is nor the other way round".to_owned()),
+        };
+        DiscardedPair::new(&pair.pair, cause, reason)
     };
     (told as f64 >= MOST * before.len() as f64).then(|| why.into_iter().map(discarded).collect())
 }
@@ -97,10 +110,13 @@ mod tests {
     #[test]
     fn a_rig_that_moved_is_one() {
         let world = World { sigma_px: 0.01, ..World::new(PAIRS, 21) };
-        let moved = world.with_camera_moved(Vector3::new(0.0, 0.02, 0.0), Vector3::zeros()).corners(22);
-        let (causes, changed) = said(7, |pair| {
-            *pair = moved.pairs.iter().find(|moved| moved.pair == pair.pair).unwrap().clone();
-        });
-        assert!(changed && causes.len() == 7 && !causes.contains(&Cause::Exchanged), "{causes:?}");
+        for turn in [2e-4, 2e-3, 2e-2] {
+            let moved = world.with_camera_moved(Vector3::new(0.0, turn, 0.0), Vector3::zeros()).corners(22);
+            let (causes, changed) = said(7, |pair| {
+                *pair = moved.pairs.iter().find(|moved| moved.pair == pair.pair).unwrap().clone();
+            });
+            let is_other = |cause: &Cause| matches!(cause, Cause::Exchanged | Cause::Turned | Cause::Mirrored);
+            assert!(changed && !causes.iter().any(is_other), "{turn}: {causes:?}");
+        }
     }
 }

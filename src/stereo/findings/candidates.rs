@@ -8,6 +8,7 @@
 
 use nalgebra::DVector;
 
+use crate::diagnostic::two_digits;
 use crate::difference::{Difference, TOLD_APART};
 use crate::stereo::findings::hypothesis::{Hypothesis, any_place, centred, refocused};
 use crate::stereo::findings::series::Change;
@@ -96,16 +97,11 @@ impl<'a> Candidate<'a> {
         }
     }
 
-    /// Expanded uncertainty (95 %) of a single number, by what it gains.
-    fn expanded(&self) -> f64 {
-        2.0 * self.change.amounts[0].abs() * (self.change.scatter.max(1.0) / self.change.gain).sqrt()
-    }
-
     fn words(&self) -> String {
         let (size, unit) = self.size();
         let amounts = &self.change.amounts;
         match self.what {
-            What::One(h) => format!("{} by {size:.3} {unit} (+- {:.3})", h.words, self.expanded()),
+            What::One(h) => format!("{} by {size:.3} {unit} (+- {})", h.words, two_digits(2.0 * self.change.sigma)),
             What::Refocused(side) => format!(
                 "the {} lens was focused otherwise (focal length by {size:.3} %, its picture moved by {:.2} px)",
                 side.name(),

@@ -5,7 +5,8 @@
 //! Method: every cause at every place of the series in one linear problem ([`series`]), an F test against the scatter
 //! that the pairs have with the change taken out, every look counted. The largest finding is taken out and the rest is
 //! looked at again. What is done about a finding follows from its effect and not from how surely it is seen
-//! ([`standing`]). Goes wrong: fewer than six pairs; more than one change at one place.
+//! ([`standing`]). Goes wrong: fewer than six poses; more than one change at one place; a step while the board stood
+//! still.
 
 mod before_step;
 mod candidates;
@@ -200,15 +201,21 @@ pub fn look(calibration: &Calibration, lengths: &VolumeLengths) -> Option<Findin
     }
     let linear = Linear::new(&problem, &calibration.layout)?.of_runs(&first);
     let hypotheses = hypothesis::all(&calibration.layout, calibration.rig());
-    let pattern = significant(&linear, &hypotheses)?;
+    let pattern = significant(&linear, &hypotheses, &drift_of_runs(&first, problem.views.len()))?;
     let candidates = candidates(&linear, &hypotheses, calibration, &pattern, pattern.by_pair.as_slice());
     let equals = likeliest(&candidates, count);
     let other = without_one(&linear, &hypotheses, calibration, (&pattern, &first), &equals);
     finding(calibration, lengths, &equals, &pattern.of_pairs(&first, problem.views.len()), other)
 }
 
-/// The first pairs of runs of pairs that show the board in one pose. Frames of a video and bursts of a camera share what
-/// moves a picture, and are no more evidence of a change than one of them.
+/// The share that each run has of a drift that grows evenly over the pairs: that of its middle.
+fn drift_of_runs(first: &[usize], pairs: usize) -> DVector<f64> {
+    let end = |run: usize| first.get(run + 1).copied().unwrap_or(pairs);
+    DVector::from_fn(first.len(), |run, _| 0.5 * (first[run] + end(run) - 1) as f64 / (pairs - 1) as f64)
+}
+
+/// The first pairs of runs of pairs that show the board in one pose. Frames of a video and bursts of a camera share
+/// what moves a picture, and are no more evidence of a change than one of them.
 fn first_of_runs(problem: &Problem) -> Vec<usize> {
     let groups = cross_validation::groups(&problem.views, &problem.values.poses);
     (0..groups.len()).filter(|&i| i == 0 || groups[i] != groups[i - 1]).collect()
@@ -262,15 +269,14 @@ fn without_one(
 
 /// The pattern of one cause that is least a matter of chance, where one is not: every step and the drift of every cause
 /// by the F test, and, where there are pairs enough, against the same pairs in another order.
-fn significant(linear: &Linear, hypotheses: &[Hypothesis]) -> Option<Pattern> {
+fn significant(linear: &Linear, hypotheses: &[Hypothesis], drift: &DVector<f64>) -> Option<Pattern> {
     let count = linear.pairs();
     let step = |first: usize| Pattern {
         kind: Kind::Step,
         first,
         by_pair: DVector::from_fn(count, |i, _| f64::from(i >= first)),
     };
-    let by_pair = DVector::from_fn(count, |i, _| i as f64 / (count - 1) as f64);
-    let drift = Pattern { kind: Kind::Drift, first: 0, by_pair };
+    let drift = Pattern { kind: Kind::Drift, first: 0, by_pair: drift.clone() };
     let patterns: Vec<Pattern> = (FEWEST_EACH..=count - FEWEST_EACH).map(step).chain([drift]).collect();
     let lines: Vec<Line> = hypotheses.iter().map(|h| linear.line(&h.direction)).collect();
     let largest = |order: &[usize]| -> (f64, f64, usize) {

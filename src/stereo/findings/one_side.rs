@@ -93,8 +93,10 @@ pub fn changed(
         let undone = with_right(corners, what, quarters);
         let explains = |fit: &Fit| fit.is_of_most(&undone) && 2.0 * fit.missed.times < missed.times;
         let fit = fitting(&undone).filter(explains)?;
-        // Undone in the other pictures instead, all is mirrored or turned: the cameras have changed places.
-        let side = fit.is_left_to_the_left.map(|is| if is { Side::Right } else { Side::Left });
+        // Undone in the other pictures instead, all is mirrored: the cameras have changed places. Which side is inverted
+        // no pictures tell.
+        let told = fit.is_left_to_the_left.filter(|_| what == OneSide::Mirrored);
+        let side = told.map(|is| if is { Side::Right } else { Side::Left });
         Some((fit.missed.times, Error::ChangedSide { what, side, fit: fit.pairs, of: undone.pairs.len() }))
     };
     let (turns, open) = (corners.board.turns_of_outline(), corners.board.turns_left_open());

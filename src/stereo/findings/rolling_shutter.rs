@@ -24,7 +24,8 @@ use crate::stereo::data::{Observation, View};
 use crate::stereo::model::{Layout, Shared};
 use crate::stereo::pairs::Cause;
 use crate::stereo::solve::Loss;
-use crate::stereo::solve::normal_equations::{self, Block, Way};
+use crate::stereo::solve::jacobian::Way;
+use crate::stereo::solve::normal_equations::{self, Block};
 use crate::stereo::volume::lengths::VolumeLengths;
 
 /// Probability of five standard deviations: what a lens lacks is alike in all pairs, so that their scatter says nothing

@@ -23,6 +23,8 @@ pub const PLACES_FROM: usize = 12;
 pub struct Change {
     /// In each of its directions, in units of them.
     pub amounts: DVector<f64>,
+    /// Standard deviation of the first of these, as the pairs scatter.
+    pub sigma: f64,
     /// What all pairs share takes up of it, so that the rig of a pair is the common one, this less, and its own part of
     /// the change.
     pub common: DVector<f64>,
@@ -174,11 +176,13 @@ impl Linear {
         let right = DVector::from_fn(all, |a, _| {
             -(0..n).map(|i| pattern[i] * directions[a].dot(&self.gradients[i])).sum::<f64>()
         });
-        let amounts = invert(&matrix)? * &right;
+        let inverse = invert(&matrix)?;
+        let amounts = &inverse * &right;
         let gain = amounts.dot(&right);
         let common = moved.iter().zip(amounts.iter()).fold(zero(), |sum, (m, a)| sum + m * *a);
         let scatter = self.scatter(directions, pattern, &common, &amounts);
-        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, common, gain, scatter })
+        let sigma = (inverse[(0, 0)] * scatter.max(1.0)).sqrt();
+        (gain.is_finite() && scatter.is_finite()).then_some(Change { amounts, sigma, common, gain, scatter })
     }
 
     /// By how much chi-squared falls where each pair has a change of its own along these directions, a number of

@@ -141,7 +141,8 @@ fn step(
         let left = difference.left_by(directions)?;
         let gain = difference.log_likelihood(left) - difference.log_likelihood(difference.chi_square());
         let common = DVector::zeros(numbers);
-        Some(Change { amounts: difference.amounts(directions)?, common, gain: 2.0 * gain, scatter: 1.0 })
+        let sigma = difference.along(directions.first()?)?.1;
+        Some(Change { amounts: difference.amounts(directions)?, sigma, common, gain: 2.0 * gain, scatter: 1.0 })
     };
     let rig = half_way(before.rig(), after.rig());
     let hypotheses = hypothesis::all(&layout, &rig);

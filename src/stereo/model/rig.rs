@@ -109,19 +109,20 @@ impl Rig {
         (self.is_left_to_the_left() == Some(false)).then(|| {
             format!(
                 "the left camera stands {:.1} mm to the right of the right one: are left and right exchanged, are the pictures of both cameras \
-                 mirrored as webcams show them, or do both hang upside down? Exchange the folders in the first case; take pictures in which \
-                 writing can be read in the second, whose points are left-handed; of a rig that hangs, or of cameras that are only named \
-                 so, all is well",
+                 mirrored as webcams show them, or do both hang upside down? Exchange the folders in the first case; in the second take \
+                 pictures in which writing can be read, for mirrored ones give mirrored (left-handed) coordinates; of a rig that hangs, or \
+                 of cameras that are only named so, all is well",
                 -right_mm.x
             )
         })
     }
 
-    /// Whether the left camera stands to the left of the right one, as that sees it; `None` of cameras one above the
-    /// other, or one behind the other, of which neither is the left one.
+    /// Whether the left camera stands to the left of the right one, as it sees that; `None` of cameras one above the
+    /// other, or one behind the other, of which neither is the left one, and where one is upside down.
     pub fn is_left_to_the_left(&self) -> Option<bool> {
         let right_mm = self.right_from_left.inverse().translation.vector;
-        (right_mm.x.abs() > right_mm.y.abs().max(right_mm.z.abs())).then_some(right_mm.x > 0.0)
+        let is_upright = crate::geometry::rotation_matrix(&self.right_from_left)[(1, 1)] > 0.0;
+        (is_upright && right_mm.x.abs() > right_mm.y.abs().max(right_mm.z.abs())).then_some(right_mm.x > 0.0)
     }
 
     /// A principal point far from the picture's middle, where lenses have it.

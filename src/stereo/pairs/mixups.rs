@@ -150,10 +150,12 @@ impl Scene<'_> {
         }
         let exchanged = view.exchanged();
         if self.fits(shared, &exchanged, 1.0) {
-            // Of cameras that stand alike both pictures turned are nearly the same as both exchanged.
-            let turned = self.undone(view, &CHANGES[0], &Side::BOTH);
-            if self.misfit_px(&turned) < FITS_WELL * self.misfit_px(&exchanged) {
-                return Some(both(&CHANGES[0]));
+            // Of cameras that stand alike both pictures turned or mirrored are nearly the same as both exchanged.
+            let miss_px = |change: &Change| self.misfit_px(&self.undone(view, change, &Side::BOTH));
+            let nearest = CHANGES.iter().map(|change| (miss_px(change), change)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let of_both = nearest.filter(|(px, _)| *px < FITS_WELL * self.misfit_px(&exchanged));
+            if let Some((_, change)) = of_both {
+                return Some(both(change));
             }
             let reason = "left and right picture are exchanged: give each the other's name";
             return Some((Cause::Exchanged, reason.to_owned()));

@@ -30,6 +30,7 @@ use crate::stereo::model::board_shape::FLAT;
 use crate::stereo::model::rig::Rig;
 use crate::stereo::model::{KnownLenses, Layout, Shared, Values};
 use crate::stereo::pairs::flip::Flip;
+use crate::stereo::pairs::series::SEVERAL;
 use crate::stereo::pairs::{Cause, numbering};
 use crate::stereo::select::model_comparison::Trial;
 use crate::stereo::select::stated_uncertainty::scatter_beside;
@@ -171,16 +172,20 @@ fn strays(
 /// How a pair is the other way round that comes several times nearer to the old rig with its pictures exchanged
 /// (`None` within), or turned or mirrored back: no knock moves a camera to the other side.
 fn other_way_round(before: &Before, board: &Board, shared: &Shared, pair: &PairCorners) -> Option<Option<Flip>> {
-    const SEVERAL: f64 = 4.0;
-    let miss_px = |pair: &PairCorners| {
-        let view = numbering::seen_on_rig(shared, board, pair, before.noise.as_ref());
-        misfit_px(shared, &view).map_or(f64::INFINITY, |(px, _)| px)
-    };
+    const NEARER: f64 = 4.0;
+    /// Ways of which none comes nearer than the others by so much are not told apart.
+    const ALIKE: f64 = 2.0;
+    let view = |pair: &PairCorners| numbering::seen_on_rig(shared, board, pair, before.noise.as_ref());
+    let miss_px = |pair: &PairCorners| misfit_px(shared, &view(pair)).map_or(f64::INFINITY, |(px, _)| px);
     let exchanged = PairCorners { pair: pair.pair.clone(), left: pair.right.clone(), right: pair.left.clone() };
     let flipped = Flip::ALL.map(|flip| (miss_px(&flip.of_pair(board, &before.rig, pair)), Some(flip)));
-    let all = std::iter::once((miss_px(&exchanged), None)).chain(flipped);
-    let (px, how) = all.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (SEVERAL * px < miss_px(pair)).then_some(how)
+    let all: Vec<_> = std::iter::once((miss_px(&exchanged), None)).chain(flipped).collect();
+    let least_px = all.iter().map(|(px, _)| *px).fold(f64::INFINITY, f64::min);
+    // Of cameras that stand alike both pictures turned are nearly the same as both exchanged, which is more usual.
+    let (px, how) = all.into_iter().find(|(px, _)| *px <= ALIKE * least_px)?;
+    // A rig that was knocked may come nearer the other way round, but does not fit.
+    let usual_px = before.noise.map_or(f64::INFINITY, |noise| noise.typical_px(std::slice::from_ref(&view(pair))));
+    (px <= SEVERAL * usual_px && NEARER * px < miss_px(pair)).then_some(how)
 }
 
 /// From the old rig to that of the pairs as the equations at the old one foretell it, with its covariance: where the

@@ -51,8 +51,8 @@ impl Search {
     pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-7, most_steps: 50 };
     /// From a minimum of nearly the same problem to the limit of rounding.
     pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 400 };
-    /// The same with a robust loss, whose curvature the equations overestimate: more steps, to a thousandth of a
-    /// standard deviation.
+    /// The same with a robust loss, to a thousandth of a standard deviation: what squares of the same weights then reach
+    /// is the last word.
     pub const ROBUST: Search = Search { first_damping: 1e-9, cost_share: 1e-10, most_steps: 100 };
     /// From a minimum of nearly the same problem to a hundredth of a standard deviation: a model on trial. A tilted
     /// sensor, its centre and its prism are exchanged for each other along a bent valley of up to two hundred steps;

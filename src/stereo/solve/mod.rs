@@ -2,6 +2,7 @@
 //! pair.
 
 mod gram_matrix;
+pub mod jacobian;
 pub mod levenberg_marquardt;
 pub mod normal_equations;
 pub mod priors;

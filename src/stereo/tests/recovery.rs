@@ -2,6 +2,8 @@
 
 use super::*;
 use crate::imaging::PairCorners;
+use crate::stereo::solve::Loss;
+use crate::stereo::solve::levenberg_marquardt::{Search, Stop};
 
 fn swapped(corners: &Corners) -> Corners {
     let mut swapped = corners.clone();
@@ -35,6 +37,16 @@ fn swapping_the_cameras_inverts_the_rig() {
     let off = (straight.rig().right_from_left.to_matrix() - back.to_matrix()).amax();
     assert!(off < 1e-6, "the rigs differ by {off}");
     assert!((straight.rig().left.fx - crossed.rig().right.fx).abs() < 1e-5);
+}
+
+/// The curvature of the loss is in its steps; by the weights alone it takes half as many more.
+#[test]
+fn a_robust_search_near_the_minimum_takes_few_steps() {
+    let found = calibrate(&World::new(9, 2).corners_by_hand(3, 0.03), &BROWN4).unwrap();
+    let mut problem = found.problem();
+    problem.values.shared.rig.left.fx *= 1.001;
+    let solution = problem.search(&found.layout, Loss::Student(4.0), Search::ROBUST);
+    assert!(solution.stop == Stop::Minimum && solution.steps <= 15, "{:?} after {}", solution.stop, solution.steps);
 }
 
 #[test]

@@ -15,7 +15,8 @@ use crate::stereo::data::residuals::of_point;
 use crate::stereo::data::view::View;
 use crate::stereo::model::projection::CAMERA_NUMBERS;
 use crate::stereo::solve::Loss;
-use crate::stereo::solve::normal_equations::{Way, inverse6, write_turn_and_shift};
+use crate::stereo::solve::jacobian::{Way, write_turn_and_shift};
+use crate::stereo::solve::normal_equations::inverse6;
 use crate::stereo::triangulate::RIG_NUMBERS;
 
 /// Whitened residuals beyond this are outliers.

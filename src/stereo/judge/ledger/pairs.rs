@@ -117,8 +117,8 @@ pub(super) fn board_since(case: &Case) -> Option<Evidence> {
     };
     let finding = case.facts.findings.iter().find(may_be_board)?;
     let detail = format!(
-        "{}. If the boards before and since are two, one of them is not as large as was said, and whether it is this one no pictures tell; all \
-         lengths are off with it. If one board was photographed throughout, nothing is",
+        "{}. If the boards before and since are two, one of them is not as large as was said, and the pictures do not tell which: all lengths \
+         may be off with it. If one board was photographed throughout, no length is off",
         finding.action
     );
     let remedy =
