@@ -17,9 +17,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     if cli.quiet {
         progress::be_quiet();
     }
-    if let Some(threads) = cli.threads {
-        start_threads(threads)?;
-    }
+    start_threads(cli.threads)?;
     let settings = Config::file(cli.config.as_deref());
     let config = Config::load(cli.config.as_deref())?;
     let uses_none =
@@ -34,9 +32,12 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     };
     let before = earlier(&cli.command, &config);
     let now = || before.as_ref().and_then(|earlier| Earlier::of(&earlier.file));
-    command(&cli.command, &config, run).map_err(|error| match now().filter(|now| before.as_ref() == Some(now)) {
-        Some(earlier) => Error::BesideEarlier(Box::new(BesideEarlier { error, earlier })),
-        None => error,
+    // On one of the threads: a short loop that another one begins would wait longer for them to wake than for its result.
+    rayon::scope(|_| command(&cli.command, &config, run)).map_err(|error| {
+        match now().filter(|now| before.as_ref() == Some(now)) {
+            Some(earlier) => Error::BesideEarlier(Box::new(BesideEarlier { error, earlier })),
+            None => error,
+        }
     })
 }
 
@@ -87,10 +88,13 @@ impl Earlier {
     }
 }
 
-/// All work that is shared between threads runs on so many.
-fn start_threads(threads: u16) -> Result<()> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global();
-    pool.map_err(|e| config::Error::Invalid { problems: vec![format!("--threads {threads}: {e}")] })?;
+/// All work runs on so many threads, as many as the processor has where none are named.
+fn start_threads(threads: Option<u16>) -> Result<()> {
+    /// What the first thread of a program usually has, bytes.
+    const STACK: usize = 8 << 20;
+    let count = threads.map_or(0, usize::from);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count).stack_size(STACK).build_global();
+    pool.map_err(|e| config::Error::Invalid { problems: vec![format!("--threads {count}: {e}")] })?;
     Ok(())
 }
 

@@ -14,6 +14,7 @@ use crate::statistics::median;
 use crate::stereo::board_pose::rig_change::cause::Explanation;
 use crate::stereo::board_pose::rig_change::judgement::Judgement;
 use crate::stereo::board_pose::{Knowledge, MeasuredPose, Series, Shape, Shared, TargetPose};
+use crate::stereo::pairs::flip::Flip;
 use crate::stereo::volume::Volume;
 
 /// Columns behind the joints.
@@ -113,8 +114,8 @@ fn rig_record(series: &Series, known: &Knowledge) -> Value {
         Judgement::Agrees => ("agrees", &[][..], None),
         Judgement::Allowed(changed) => ("allowed", &changed.explanations[..], None),
         Judgement::Contradicts(changed) => ("contradicts", &changed.explanations[..], None),
-        Judgement::Exchanged => ("exchanged", &[][..], None),
-        Judgement::Mirrored(_) => ("mirrored", &[][..], None),
+        Judgement::OtherWayRound(Flip::Exchanged) => ("exchanged", &[][..], None),
+        Judgement::OtherWayRound(_) => ("mirrored", &[][..], None),
         // The first pose after the rig moved.
         Judgement::Moved { since, .. } => ("moved", &[][..], Some(since)),
         Judgement::Loose { .. } => ("loose", &[][..], None),

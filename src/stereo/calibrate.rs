@@ -9,6 +9,7 @@ use std::sync::OnceLock;
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::imaging::{Board, Corners, Side, Skipped};
+use crate::statistics::median;
 use crate::stereo::board_pose::print_share::print_share;
 use crate::stereo::data::{NeighbourCorrelation, Noise, View, residuals};
 use crate::stereo::init::board_pose;
@@ -97,6 +98,11 @@ impl Calibration {
     pub fn rms_px(&self) -> f64 {
         let left = residuals::active(&self.views, &self.values).unwrap_or_default();
         residuals::root_mean_square(left.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0)
+    }
+
+    /// Median over the pairs of what they miss the rig by, px.
+    pub fn usual_misfit_px(&self) -> Option<f64> {
+        median(self.views.iter().filter_map(|view| Some(board_pose::misfit_px(&self.values.shared, view)?.0)))
     }
 
     /// Names of the pairs that were used.

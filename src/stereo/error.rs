@@ -102,13 +102,11 @@ pub enum Error {
         without: Vec<Skipped>,
     },
     /// Pairs that are compared with a rig fit it with their pictures exchanged, or turned or mirrored back.
-    #[error("{}: each pair fits the calibration the other way round", match .flipped {
-        None => "left and right pictures are exchanged".to_owned(),
-        Some(how) => format!("the pictures are {how}"),
-    })]
+    #[error("{how}: each pair fits the calibration the other way round")]
     OtherWayRound {
-        /// How they are turned or mirrored; `None` where they are exchanged.
-        flipped: Option<&'static str>,
+        how: &'static str,
+        /// What to do.
+        remedy: &'static str,
     },
     /// The box that a verdict is asked for lies where the cameras do not both look.
     #[error("no place of the box of `--volume` is seen by both cameras")]
@@ -333,12 +331,7 @@ impl Explain for Error {
                     "photograph the board where both cameras see it at once, and check that equal names belong together"
                 }
                 Error::OneSideBlind { .. } => "both cameras must show one board at once, in pictures as they took them",
-                Error::OtherWayRound { flipped: None } => {
-                    "name the left camera's pictures first; if the cameras themselves changed places, calibrate anew"
-                }
-                Error::OtherWayRound { flipped: Some(_) } => {
-                    "take them with the settings of the cameras with which these were calibrated, or calibrate anew"
-                }
+                Error::OtherWayRound { remedy, .. } => remedy,
                 Error::OutOfView { boards_mm: [[x0, y0, z0], [x1, y1, z1]] } => {
                     return Some(format!(
                         "`--volume X0,Y0,Z0,X1,Y1,Z1` is in mm in the left camera's frame, z along its line of sight; the boards were within \

@@ -17,8 +17,8 @@ use crate::imaging::lattice::turned_place;
 pub const SQUARES_MM: RangeInclusive<f64> = 1e-3..=1e5;
 
 /// How much higher or lower than wide a square may be, as a share: printers stretch by less, and what is off by more is
-/// another board.
-pub const MOST_STRETCH: f64 = 0.03;
+/// another board. Three per cent in decimal figures are within.
+pub const MOST_STRETCH: f64 = 0.03 + 1e-9;
 
 /// What tells a board's corners apart.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -160,21 +160,16 @@ impl<'a> Run<'a> {
             return None;
         }
         let better = |px: f64| px < 0.3 * misfit_px;
-        let misfit = |change: &dyn Fn(&PairCorners) -> PairCorners| {
-            let pairs: Vec<PairCorners> = self.pairs.iter().map(change).collect();
-            let others = starts(&self.known.rig, &self.known.board, &pairs);
+        let misfit_px_of = |flip: Flip| {
+            let Knowledge { rig, board, .. } = self.known;
+            let pairs: Vec<PairCorners> = self.pairs.iter().map(|pair| flip.of_pair(board, rig, pair)).collect();
+            let others = starts(rig, board, &pairs);
             median(others.iter().map(|s| s.misfit_px)).unwrap_or(f64::INFINITY)
         };
-        let exchange =
-            |p: &PairCorners| PairCorners { pair: p.pair.clone(), left: p.right.clone(), right: p.left.clone() };
-        let exchanged = (misfit(&exchange), Judgement::Exchanged);
-        let flipped = Flip::ALL.map(|flip| {
-            (misfit(&|pair| flip.of_pair(&self.known.board, &self.known.rig, pair)), Judgement::Mirrored(flip))
-        });
         // A rig that is nearly its own mirror image fits both ways.
-        let others = std::iter::once(exchanged).chain(flipped).filter(|(px, _)| better(*px));
-        if let Some((_, judgement)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
-            return Some(judgement);
+        let others = Flip::ALL.map(|flip| (misfit_px_of(flip), flip)).into_iter().filter(|(px, _)| better(*px));
+        if let Some((_, flip)) = others.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            return Some(Judgement::OtherWayRound(flip));
         }
         if misfit_px <= limit {
             return None;

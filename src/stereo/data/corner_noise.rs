@@ -64,7 +64,7 @@ impl Noise {
 
     /// Fitted to the median, so that up to half of the corners may be wrong. `residuals` are the active corners' in px.
     pub fn from_median(residuals: &[(Observation, Vector2<f64>)]) -> Noise {
-        fit(residuals, |chi| {
+        fit(&aligned(residuals), |chi| {
             let middle = chi.len() / 2;
             *chi.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN_CHI_SQUARE_2
         })
@@ -73,7 +73,7 @@ impl Noise {
     /// Fitted to the mean, with `unknowns` numbers fitted to the same residuals.
     pub fn from_mean(residuals: &[(Observation, Vector2<f64>)], unknowns: usize) -> Noise {
         let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
-        fit(residuals, |chi| chi.iter().sum::<f64>() / freedom)
+        fit(&aligned(residuals), |chi| chi.iter().sum::<f64>() / freedom)
     }
 
     /// The likeliest noise with the loss that belongs to it, `unknowns` numbers being fitted to the same residuals:
@@ -84,9 +84,10 @@ impl Noise {
         /// corners'.
         const FREEDOMS: [f64; 9] = [4.0, 5.0, 6.0, 8.0, 11.0, 16.0, 24.0, 36.0, 64.0];
         let freedom = (2 * residuals.len()).saturating_sub(unknowns).max(1) as f64;
+        let aligned = aligned(residuals);
         let with = |loss: Loss| {
-            let noise = fit(residuals, |chi| chi.iter().map(|c| loss.cost_and_weight(*c).1 * c).sum::<f64>() / freedom);
-            (noise, loss, noise.log_likelihood(residuals, loss))
+            let noise = fit(&aligned, |chi| chi.iter().map(|c| loss.weight(*c) * c).sum::<f64>() / freedom);
+            (noise, loss, noise.log_likelihood_of(&aligned, loss))
         };
         let gaussian = with(Loss::Squared);
         let least = gaussian.2 + 0.5 * (residuals.len().max(1) as f64).ln();
@@ -98,11 +99,15 @@ impl Noise {
 
     /// Logarithm of the likelihood of residuals, but for a constant.
     pub fn log_likelihood(&self, residuals: &[(Observation, Vector2<f64>)], loss: Loss) -> f64 {
-        let of = |(o, r): &(Observation, Vector2<f64>)| {
-            let covariance = self.covariance(o);
-            let whitened = whitener(&covariance) * r;
-            -0.5 * covariance.determinant().max(f64::MIN_POSITIVE).ln()
-                - loss.cost_and_weight(whitened.norm_squared()).0
+        self.log_likelihood_of(&aligned(residuals), loss)
+    }
+
+    fn log_likelihood_of(&self, residuals: &[Aligned], loss: Loss) -> f64 {
+        let added = self.added_px * self.added_px;
+        let of = |aligned: &Aligned| {
+            let [a, b] = aligned.map(|(_, own)| (self.factor * own + added).max(FLOOR_PX * FLOOR_PX));
+            let squared = aligned[0].0 / a + aligned[1].0 / b;
+            -0.5 * (a * b).ln() - loss.cost_and_weight(squared).0
         };
         residuals.iter().map(of).sum()
     }
@@ -132,10 +137,13 @@ fn shrunk(chi: &[f64], first: f64, reduced: &impl Fn(&mut [f64]) -> f64) -> f64 
 /// A residual along the axes of its corner's own covariance: squares, px^2, each with the variance it comes with.
 type Aligned = [(f64, f64); 2];
 
-fn aligned((o, residual): &(Observation, Vector2<f64>)) -> Aligned {
-    let eigen = o.covariance_px2.symmetric_eigen();
-    let along = eigen.eigenvectors.tr_mul(residual);
-    [0, 1].map(|k| (along[k] * along[k], eigen.eigenvalues[k]))
+fn aligned(residuals: &[(Observation, Vector2<f64>)]) -> Vec<Aligned> {
+    let one = |(o, residual): &(Observation, Vector2<f64>)| {
+        let eigen = o.covariance_px2.symmetric_eigen();
+        let along = eigen.eigenvectors.tr_mul(residual);
+        [0, 1].map(|k| (along[k] * along[k], eigen.eigenvalues[k]))
+    };
+    residuals.iter().map(one).collect()
 }
 
 /// Squared lengths in units of the covariances with `added` to both variances.
@@ -145,21 +153,21 @@ fn chi_squares(residuals: &[Aligned], added: f64) -> Vec<f64> {
 }
 
 /// Finds the model whose `reduced` chi-square is one.
-fn fit(residuals: &[(Observation, Vector2<f64>)], reduced: impl Fn(&mut [f64]) -> f64) -> Noise {
+fn fit(residuals: &[Aligned], reduced: impl Fn(&mut [f64]) -> f64) -> Noise {
     if residuals.is_empty() {
         return Noise::UNIT;
     }
-    let mut plain: Vec<f64> = residuals.iter().map(|(_, r)| r.norm_squared()).collect();
+    let mut plain: Vec<f64> = residuals.iter().map(|[a, b]| a.0 + b.0).collect();
     let plain = reduced(&mut plain).max(FLOOR_PX * FLOOR_PX);
-    if residuals.iter().all(|(o, _)| o.covariance_px2.m11 == 0.0) {
+    let is_known = |[a, b]: &Aligned| a.1.max(b.1) > 0.0;
+    if !residuals.iter().any(is_known) {
         return Noise { factor: 1.0, added_px: plain.sqrt(), reduced_chi_square: None };
     }
-    let aligned: Vec<Aligned> = residuals.iter().map(aligned).collect();
-    let with = |added: f64| reduced(&mut chi_squares(&aligned, added));
-    let known = residuals.iter().all(|(o, _)| o.covariance_px2.m11 > 0.0);
+    let with = |added: f64| reduced(&mut chi_squares(residuals, added));
+    let known = residuals.iter().all(is_known);
     let own = known.then(|| with(0.0));
     if let Some(own) = own.filter(|own| *own <= 1.0) {
-        let factor = shrunk(&chi_squares(&aligned, 0.0), own, &reduced);
+        let factor = shrunk(&chi_squares(residuals, 0.0), own, &reduced);
         return Noise { factor, added_px: 0.0, reduced_chi_square: Some(own) };
     }
     // With the covariances in, less than the plain scatter is missing: it lies between zero and that. The inverse of

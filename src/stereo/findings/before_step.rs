@@ -8,7 +8,6 @@
 
 use super::one_side::MOST;
 use crate::imaging::{Corners, PairCorners, Side};
-use crate::statistics::median;
 use crate::stereo::calibrate::Calibration;
 use crate::stereo::data::View;
 use crate::stereo::findings::Finding;
@@ -48,8 +47,7 @@ fn the_other_way_round(found: &Calibration, corners: &Corners, before: &[Discard
     let views: Vec<View> = corners.pairs.iter().map(of).collect();
     let is_before = |view: &View| before.iter().any(|pair| pair.pair == view.pair);
     let strays: Vec<usize> = (0..views.len()).filter(|&i| is_before(&views[i])).collect();
-    let usual_px = median(found.views.iter().filter_map(|view| Some(misfit_px(shared, view)?.0)))?;
-    let limit_px = SEVERAL * usual_px;
+    let limit_px = SEVERAL * found.usual_misfit_px()?;
     let is_off = |i: &usize| misfit_px(shared, &views[*i]).is_none_or(|(px, _)| px > limit_px);
     let alone_px = Side::BOTH.map(|side| vec![Some(found.alone_px[side as usize]); views.len()]);
     let alone_px = [alone_px[0].as_slice(), alone_px[1].as_slice()];

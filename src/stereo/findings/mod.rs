@@ -50,6 +50,7 @@ const FEWEST_EACH: usize = 2;
 /// large a change may be found.
 const PERMUTED_FROM: usize = 12;
 const PERMUTATIONS: usize = 400;
+const PERMUTED_AT_ONCE: usize = 20;
 
 /// Fewest pairs in which a change is looked for.
 const FEWEST: usize = 6;
@@ -278,15 +279,15 @@ fn significant(linear: &Linear, hypotheses: &[Hypothesis], drift: &DVector<f64>)
     };
     let drift = Pattern { kind: Kind::Drift, first: 0, by_pair: drift.clone() };
     let patterns: Vec<Pattern> = (FEWEST_EACH..=count - FEWEST_EACH).map(step).chain([drift]).collect();
-    let lines: Vec<Line> = hypotheses.iter().map(|h| linear.line(&h.direction)).collect();
+    let lines: Vec<Line> = hypotheses.iter().filter_map(|h| linear.line(&h.direction)).collect();
     let largest = |order: &[usize]| -> (f64, f64, usize) {
         let mut most = (0.0, 1.0, 0);
         for (p, pattern) in patterns.iter().enumerate() {
             let ordered = DVector::from_fn(count, |i, _| pattern.by_pair[order[i]]);
             for line in &lines {
-                let (f, freedom) = line.f(&ordered);
+                let f = line.f(&ordered);
                 if f > most.0 {
-                    most = (f, freedom, p);
+                    most = (f, line.freedom(), p);
                 }
             }
         }
@@ -298,10 +299,13 @@ fn significant(linear: &Linear, hypotheses: &[Hypothesis], drift: &DVector<f64>)
         return None;
     }
     if count >= PERMUTED_FROM {
-        let larger =
-            (0..PERMUTATIONS).into_par_iter().filter(|k| largest(&shuffled(count, *k)).0 > 1.000_001 * f).count();
-        if larger * 100 > PERMUTATIONS {
-            return None;
+        let is_larger = |k: usize| largest(&shuffled(count, k)).0 > 1.000_001 * f;
+        let mut larger = 0;
+        for block in (0..PERMUTATIONS).step_by(PERMUTED_AT_ONCE) {
+            larger += (block..block + PERMUTED_AT_ONCE).into_par_iter().filter(|k| is_larger(*k)).count();
+            if larger * 100 > PERMUTATIONS {
+                return None;
+            }
         }
     }
     patterns.into_iter().nth(at)

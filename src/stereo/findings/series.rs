@@ -37,35 +37,37 @@ pub struct Change {
 
 /// One direction over the series: what any pattern of it gains is a quadratic form over the pairs.
 pub struct Line {
-    /// Slope of the gradient by the amounts of two pairs, all shared numbers and poses solved again.
+    /// Slope of the gradient by the amounts of two pairs, all shared numbers and poses solved again, what goes with the
+    /// board's place taken out.
     form: DMatrix<f64>,
-    /// Each pair's gradient along the direction.
+    /// Each pair's gradient along the direction, with the same taken out.
     gradient: DVector<f64>,
-    /// Each pair's own information on the amount.
-    own: Vec<f64>,
-    /// Patterns that are a nuisance, the board's place, and the form applied to each.
-    places: Vec<DVector<f64>>,
-    places_turned: Vec<DVector<f64>>,
+    /// Each pair's weight in the scatter along it.
+    weights: Vec<f64>,
+    freedom: f64,
 }
 
 impl Line {
-    /// F of a pattern: what it gains over the pairs' scatter with it taken out, and the degrees of freedom of that
-    /// scatter. Zero where the pairs do not determine it.
-    pub fn f(&self, pattern: &DVector<f64>) -> (f64, f64) {
-        let columns: Vec<&DVector<f64>> = std::iter::once(pattern).chain(&self.places).collect();
-        let freedom = |told: usize| (told as f64 - 1.0 - columns.len() as f64).max(1.0);
-        let pattern_turned = &self.form * pattern;
-        let turned: Vec<&DVector<f64>> = std::iter::once(&pattern_turned).chain(&self.places_turned).collect();
-        let matrix = DMatrix::from_fn(columns.len(), columns.len(), |a, b| columns[a].dot(turned[b]));
-        let right = DVector::from_fn(columns.len(), |a, _| -columns[a].dot(&self.gradient));
-        let Some(inverse) = invert(&matrix) else { return (0.0, freedom(pattern.len())) };
-        let amounts = &inverse * right;
-        let mut left = self.gradient.clone();
-        turned.iter().zip(amounts.iter()).for_each(|(turned, amount)| left.axpy(*amount, turned, 1.0));
-        let (squares, told) = sum_of_squares(left.iter().copied().zip(self.own.iter().copied()));
-        let freedom = freedom(told);
-        let f = amounts[0].powi(2) / inverse[(0, 0)] / (squares / freedom).max(1.0);
-        (if f.is_finite() { f } else { 0.0 }, freedom)
+    /// F of a pattern: what it gains over the pairs' scatter with it taken out. Zero where the pairs do not determine
+    /// it.
+    pub fn f(&self, pattern: &DVector<f64>) -> f64 {
+        /// Share of a pattern's information that rounding may be.
+        const ROUNDING: f64 = 1e-12;
+        let turned = &self.form * pattern;
+        let information = pattern.dot(&turned);
+        if information <= ROUNDING * pattern.norm_squared() * self.form.diagonal().max() {
+            return 0.0;
+        }
+        let amount = -pattern.dot(&self.gradient) / information;
+        let left = self.gradient.iter().zip(turned.iter()).map(|(g, t)| g + amount * t);
+        let squares: f64 = left.zip(&self.weights).map(|(left, weight)| left * left * weight).sum();
+        let f = amount * amount * information / (squares / self.freedom).max(1.0);
+        if f.is_finite() { f } else { 0.0 }
+    }
+
+    /// Degrees of freedom of the pairs' scatter.
+    pub fn freedom(&self) -> f64 {
+        self.freedom
     }
 }
 
@@ -144,18 +146,25 @@ impl Linear {
         self.matrices.len()
     }
 
-    /// One direction over the series.
-    pub fn line(&self, direction: &DVector<f64>) -> Line {
+    /// One direction over the series. `None` where the pairs do not tell what goes with the board's place.
+    pub fn line(&self, direction: &DVector<f64>) -> Option<Line> {
         let n = self.pairs();
         let products: Vec<DVector<f64>> = self.matrices.iter().map(|m| m * direction).collect();
         let moved: Vec<DVector<f64>> = products.iter().map(|p| &self.inverse * p).collect();
         let own: Vec<f64> = products.iter().map(|p| direction.dot(p)).collect();
         let form = DMatrix::from_fn(n, n, |i, j| if i == j { own[i] } else { 0.0 } - products[i].dot(&moved[j]));
         let gradient = DVector::from_fn(n, |i, _| direction.dot(&self.gradients[i]));
-        let axes = if n >= PLACES_FROM { 0..3 } else { 0..0 };
-        let places: Vec<DVector<f64>> = axes.map(|k| DVector::from_fn(n, |i, _| self.places[i][k])).collect();
-        let places_turned = places.iter().map(|place| &form * place).collect();
-        Line { form, gradient, own, places, places_turned }
+        let (weights, told) = weights(&own);
+        let axes = if n >= PLACES_FROM { 3 } else { 0 };
+        let freedom = (told as f64 - 2.0 - axes as f64).max(1.0);
+        if axes == 0 {
+            return Some(Line { form, gradient, weights, freedom });
+        }
+        let places = DMatrix::from_fn(n, axes, |i, k| self.places[i][k]);
+        let turned = &form * &places;
+        let through = &turned * invert(&places.tr_mul(&turned))?;
+        let gradient = &gradient - &through * places.tr_mul(&gradient);
+        Some(Line { form: form - through * turned.transpose(), gradient, weights, freedom })
     }
 
     /// A change along these directions that each pair has by so much as the pattern says. `None` where the pairs do not
@@ -231,27 +240,27 @@ impl Linear {
         let own = directions.iter().zip(amounts.iter()).fold(common * 0.0, |sum, (d, a)| sum + d * *a);
         let (mut sum, mut freedom) = (0.0, 0);
         for direction in directions {
-            let of_pair = |(i, x): (usize, &f64)| {
+            let information = |m: &DMatrix<f64>| direction.dot(&(m * direction));
+            let (weights, told) = weights(&self.matrices.iter().map(information).collect::<Vec<f64>>());
+            for (i, (x, weight)) in pattern.iter().zip(weights).enumerate() {
                 let left = &self.gradients[i] + &self.matrices[i] * (&own * *x - common);
-                (direction.dot(&left), direction.dot(&(&self.matrices[i] * direction)))
-            };
-            let (squares, told) = sum_of_squares(pattern.iter().enumerate().map(of_pair));
-            sum += squares;
+                sum += direction.dot(&left).powi(2) * weight;
+            }
             freedom += told.saturating_sub(2);
         }
         sum / freedom.max(1) as f64
     }
 }
 
-/// Squares of what pairs leave along a direction, each by its information on it, and how many of them tell it.
-fn sum_of_squares(pairs: impl Iterator<Item = (f64, f64)>) -> (f64, usize) {
+/// Weights of what pairs leave along a direction, by each one's information on it, and how many of them tell it.
+fn weights(information: &[f64]) -> (Vec<f64>, usize) {
     /// Share of the information of the pair that tells most below which a pair, such as of one picture, tells nothing:
     /// what is left there is rounding.
     const TELLS: f64 = 1e-9;
-    let pairs: Vec<(f64, f64)> = pairs.collect();
-    let most = pairs.iter().map(|(_, information)| *information).fold(f64::MIN_POSITIVE, f64::max);
-    let telling = || pairs.iter().filter(|(_, information)| *information > TELLS * most);
-    (telling().map(|(left, information)| left * left / information).sum(), telling().count())
+    let most = information.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    let tells = |information: &f64| *information > TELLS * most;
+    let weights = information.iter().map(|own| if tells(own) { 1.0 / own } else { 0.0 }).collect();
+    (weights, information.iter().filter(|own| tells(own)).count())
 }
 
 #[cfg(test)]
@@ -283,7 +292,7 @@ mod tests {
         let told = |problem: &Problem| {
             let linear = Linear::new(problem, &layout).unwrap();
             let change = linear.change(std::slice::from_ref(&yaw), pattern.as_slice()).unwrap();
-            (change.scatter, linear.line(&yaw).f(&pattern).0)
+            (change.scatter, linear.line(&yaw).unwrap().f(&pattern))
         };
         let (scatter_of_all, f_of_all) = told(&all);
         // Which way that is rounded differs from pair to pair.

@@ -18,7 +18,6 @@ use super::series::Change;
 use super::{Finding, Kind, hold};
 use crate::difference::{Difference, TOLD_APART};
 use crate::imaging::{Corners, PairCorners};
-use crate::statistics::median;
 use crate::stereo::Rig;
 use crate::stereo::calibrate::{Calibration, calibrate};
 use crate::stereo::init::board_pose::misfit_px;
@@ -67,7 +66,7 @@ fn part(corners: &Corners, pairs: &[PairCorners]) -> Corners {
 /// The earliest pair that fits a rig of the last ones and from which on most pairs do.
 fn first_that_fits(found: &Calibration, pairs: &[PairCorners]) -> Option<usize> {
     let shared = &found.values.shared;
-    let usual_px = median(found.views.iter().filter_map(|view| Some(misfit_px(shared, view)?.0)))?;
+    let usual_px = found.usual_misfit_px()?;
     let fits = |pair: &PairCorners| {
         let view = seen_on_rig(shared, &found.board, pair, Some(&found.noise));
         misfit_px(shared, &view).is_some_and(|(px, _)| px <= SEVERAL * usual_px)

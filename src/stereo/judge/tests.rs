@@ -68,7 +68,7 @@ fn changed(mut corners: Corners, change: impl Fn(usize, bool, &mut Corner)) -> C
 /// Two prints of one board in a series: of which the size was said, no pictures tell.
 #[test]
 fn a_rig_since_another_board_may_be_scaled() {
-    const LINE: &str = "board of the rig since it changed";
+    const LINE: &str = "changes over the pairs";
     let world = world(14, 5);
     let changed_to = |other: &World| {
         let mut corners = world.corners(6);
@@ -79,10 +79,10 @@ fn a_rig_since_another_board_may_be_scaled() {
         let board = world.board.scaled(1.0 + percent / 100.0);
         let judged = changed_to(&World { board, ..world.clone() });
         assert!(judged.verdict != Verdict::Pass, "{percent} %");
-        assert_eq!(line(&judged, LINE).allows, Verdict::Undecided, "{percent} %");
+        assert_ne!(line(&judged, LINE).allows, Verdict::Pass, "{percent} %");
     }
     let turned = changed_to(&world.with_camera_moved(Vector3::new(0.0, 2e-3, 0.0), Vector3::zeros()));
-    assert!(turned.evidence.iter().all(|line| line.what != LINE) && turned.verdict == Verdict::Pass);
+    assert!(line(&turned, LINE).allows == Verdict::Pass && turned.verdict == Verdict::Pass);
 }
 
 #[test]

@@ -90,7 +90,7 @@ impl Camera {
 
     /// Normalised image coordinates (x/z, y/z) as the lens bends them (OpenCV, `calib3d` documentation).
     pub fn distort(&self, n: &Point2<f64>) -> Point2<f64> {
-        self.distort_with_slope(n).0
+        self.distort_with_slope(self.tilt().as_ref(), n).0
     }
 
     /// The ray through a raw picture point: normalised coordinates (x/z, y/z) with `distort` undone by Newton's method.
@@ -98,8 +98,9 @@ impl Camera {
     pub fn undistort(&self, px: &Point2<f64>) -> Option<Point2<f64>> {
         let target = Point2::new((px.x - self.cx) / self.fx, (px.y - self.cy) / self.fy);
         let mut n = target;
+        let tilt = self.tilt();
         for _ in 0..50 {
-            let (at, slope) = self.distort_with_slope(&n);
+            let (at, slope) = self.distort_with_slope(tilt.as_ref(), &n);
             let miss = at - target;
             let det = slope.determinant();
             // A lens keeps orientation; past the fold of the radial polynomial the determinant changes sign.

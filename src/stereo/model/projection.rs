@@ -5,8 +5,8 @@
 
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Point2, Point3, Vector2, Vector3};
 
-use crate::stereo::Camera;
 use crate::stereo::model::camera::{onto_tilted, tilt_matrix, tilts};
+use crate::stereo::{Camera, Lens};
 
 /// Numbers of a camera: `fx fy cx cy`, then OpenCV's 14 distortion coefficients.
 pub const CAMERA_NUMBERS: usize = 18;
@@ -31,17 +31,24 @@ struct Bent {
 
 impl Camera {
     /// Projects a point (mm, in front of the camera) and differentiates. `None` at or behind the camera's plane.
-    #[inline(always)]
     pub fn project_with_derivatives(&self, point: &Point3<f64>) -> Option<Projection> {
+        self.project_through(self.tilt().as_ref(), point)
+    }
+
+    /// The same of a camera whose sensor's tilt is at hand.
+    #[inline(always)]
+    pub fn project_through(&self, tilt: Option<&Tilt>, point: &Point3<f64>) -> Option<Projection> {
         // A comparison with NaN is false, so this way round it is refused as well.
         let in_front = point.z > 0.0;
         if !in_front {
             return None;
         }
-        let ray = Point2::new(point.x / point.z, point.y / point.z);
-        let bent = self.bend(&ray);
+        // One division for all: they are what a corner costs most.
+        let by_depth = 1.0 / point.z;
+        let ray = Point2::new(point.x * by_depth, point.y * by_depth);
+        let bent = self.bend(tilt, &ray);
         let f = Matrix2::new(self.fx, 0.0, 0.0, self.fy);
-        let ray_by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) / point.z;
+        let ray_by_point = Matrix2x3::new(1.0, 0.0, -ray.x, 0.0, 1.0, -ray.y) * by_depth;
         let mut by_camera = [Vector2::zeros(); CAMERA_NUMBERS];
         by_camera[0].x = bent.at.x;
         by_camera[1].y = bent.at.y;
@@ -58,21 +65,26 @@ impl Camera {
     }
 
     /// `distort` with its derivative by the ray.
-    pub fn distort_with_slope(&self, ray: &Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
-        let bent = self.bend(ray);
+    pub fn distort_with_slope(&self, tilt: Option<&Tilt>, ray: &Point2<f64>) -> (Point2<f64>, Matrix2<f64>) {
+        let bent = self.bend(tilt, ray);
         (bent.at, bent.by_ray)
     }
 
+    /// How its sensor is tilted; `None` for a lens without.
+    pub fn tilt(&self) -> Option<Tilt> {
+        (self.lens == Lens::Tilted14).then(|| Tilt::new(self.distortion[12], self.distortion[13]))
+    }
+
     #[inline(always)]
-    fn bend(&self, ray: &Point2<f64>) -> Bent {
-        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = self.distortion;
+    fn bend(&self, tilt: Option<&Tilt>, ray: &Point2<f64>) -> Bent {
+        let [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, ..] = self.distortion;
         let (x, y) = (ray.x, ray.y);
         let r2 = x * x + y * y;
         let (r4, r6) = (r2 * r2, r2 * r2 * r2);
-        let below = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / below;
+        let share = 1.0 / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) * share;
         let radial_by_r2 =
-            (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3) - radial * (k4 + r2 * (2.0 * k5 + 3.0 * r2 * k6))) / below;
+            (k1 + r2 * (2.0 * k2 + 3.0 * r2 * k3) - radial * (k4 + r2 * (2.0 * k5 + 3.0 * r2 * k6))) * share;
         let (prism_x, prism_y) = (2.0 * (s1 + 2.0 * s2 * r2), 2.0 * (s3 + 2.0 * s4 * r2));
         let at = Point2::new(
             x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2),
@@ -85,7 +97,7 @@ impl Camera {
             mixed + prism_y * x,
             radial + 2.0 * y * y * radial_by_r2 + 6.0 * p1 * y + 2.0 * p2 * x + prism_y * y,
         );
-        let along = |factor: f64| Vector2::new(x, y) * (factor / below);
+        let along = |factor: f64| Vector2::new(x, y) * (factor * share);
         let by_distortion = [
             along(r2),
             along(r4),
@@ -103,27 +115,44 @@ impl Camera {
             Vector2::zeros(),
         ];
         let bent = Bent { at, by_ray, by_distortion };
-        if self.lens == crate::stereo::Lens::Tilted14 { tilt(bent, tau_x, tau_y) } else { bent }
+        match tilt {
+            Some(tilt) => tilt.put_behind(bent),
+            None => bent,
+        }
     }
 }
 
-/// Puts the tilted sensor behind the lens.
-fn tilt(flat: Bent, tau_x: f64, tau_y: f64) -> Bent {
-    let m = tilt_matrix(tau_x, tau_y);
-    let from = Vector3::new(flat.at.x, flat.at.y, 1.0);
-    let to = m * from;
-    let at = Point2::new(to.x / to.z, to.y / to.z);
-    let divide = Matrix2x3::new(1.0, 0.0, -at.x, 0.0, 1.0, -at.y) / to.z;
-    let slope: Matrix2<f64> = divide * m.fixed_view::<3, 2>(0, 0);
-    let (m_by_x, m_by_y) = tilt_matrix_slopes(tau_x, tau_y);
-    let mut by_distortion = flat.by_distortion.map(|derivative| slope * derivative);
-    by_distortion[12] = divide * m_by_x * from;
-    by_distortion[13] = divide * m_by_y * from;
-    Bent { at, by_ray: slope * flat.by_ray, by_distortion }
+/// A tilted sensor: the matrix of its tilt, and the derivatives of that by both angles.
+pub struct Tilt {
+    matrix: Matrix3<f64>,
+    by_angles: [Matrix3<f64>; 2],
+}
+
+impl Tilt {
+    fn new(tau_x: f64, tau_y: f64) -> Tilt {
+        Tilt { matrix: tilt_matrix(tau_x, tau_y), by_angles: tilt_matrix_slopes(tau_x, tau_y) }
+    }
+
+    /// Puts the sensor behind the lens.
+    #[inline(always)]
+    fn put_behind(&self, flat: Bent) -> Bent {
+        let from = Vector3::new(flat.at.x, flat.at.y, 1.0);
+        let to = self.matrix * from;
+        let by_depth = 1.0 / to.z;
+        let at = Point2::new(to.x * by_depth, to.y * by_depth);
+        let divide = Matrix2x3::new(1.0, 0.0, -at.x, 0.0, 1.0, -at.y) * by_depth;
+        let slope: Matrix2<f64> = divide * self.matrix.fixed_view::<3, 2>(0, 0);
+        let mut by_distortion = flat.by_distortion;
+        by_distortion[..12].iter_mut().for_each(|derivative| *derivative = slope * *derivative);
+        for (derivative, by_angle) in by_distortion[12..].iter_mut().zip(&self.by_angles) {
+            *derivative = divide * by_angle * from;
+        }
+        Bent { at, by_ray: slope * flat.by_ray, by_distortion }
+    }
 }
 
 /// Derivatives of [`tilt_matrix`] by `tau_x` and `tau_y`.
-fn tilt_matrix_slopes(tau_x: f64, tau_y: f64) -> (Matrix3<f64>, Matrix3<f64>) {
+fn tilt_matrix_slopes(tau_x: f64, tau_y: f64) -> [Matrix3<f64>; 2] {
     let (sx, cx) = tau_x.sin_cos();
     let (sy, cy) = tau_y.sin_cos();
     let [about_x, about_y] = tilts(tau_x, tau_y);
@@ -131,13 +160,12 @@ fn tilt_matrix_slopes(tau_x: f64, tau_y: f64) -> (Matrix3<f64>, Matrix3<f64>) {
     let about_y_slope = Matrix3::new(-sy, 0.0, -cy, 0.0, 0.0, 0.0, cy, 0.0, -sy);
     let r = about_y * about_x;
     let slope = |r_slope: Matrix3<f64>| onto_tilted(&r_slope, 0.0) * r + onto_tilted(&r, 1.0) * r_slope;
-    (slope(about_y * about_x_slope), slope(about_y_slope * about_x))
+    [slope(about_y * about_x_slope), slope(about_y_slope * about_x)]
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use crate::stereo::Lens;
 
     /// A camera with every coefficient of its lens in use.
     pub fn bent_camera(lens: Lens) -> Camera {

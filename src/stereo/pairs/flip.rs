@@ -1,11 +1,13 @@
-//! Pictures that are the other way round: a camera or a program mirrors them, or turns them by half a turn.
+//! Pairs that are the other way round: left and right are exchanged, or a camera or a program mirrors or turns both.
 
 use crate::imaging::{Board, Corner, PairCorners};
-use crate::stereo::Rig;
+use crate::stereo::{Camera, Rig};
 
-/// How pictures are the other way round.
+/// How pairs are the other way round.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Flip {
+    /// Left picture for right one.
+    Exchanged,
     /// Left for right.
     Mirrored,
     /// Top for bottom.
@@ -15,20 +17,35 @@ pub enum Flip {
 }
 
 impl Flip {
-    pub const ALL: [Flip; 3] = [Flip::Mirrored, Flip::UpsideDown, Flip::HalfTurn];
+    /// The more usual ones first.
+    pub const ALL: [Flip; 4] = [Flip::Exchanged, Flip::Mirrored, Flip::UpsideDown, Flip::HalfTurn];
 
     pub fn describe(self) -> &'static str {
         match self {
-            Flip::Mirrored => "mirrored, left for right",
-            Flip::UpsideDown => "mirrored, top for bottom",
-            Flip::HalfTurn => "turned by half a turn",
+            Flip::Exchanged => "left and right pictures are exchanged",
+            Flip::Mirrored => "the pictures are mirrored, left for right",
+            Flip::UpsideDown => "the pictures are mirrored, top for bottom",
+            Flip::HalfTurn => "the pictures are turned by half a turn",
         }
     }
 
-    /// A pair as it would have been found in pictures that are the other way round, each with the camera that it has.
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Flip::Exchanged => "give each the other's name; if the cameras themselves changed places, calibrate anew",
+            _ => {
+                "take the pictures as the cameras give them, as at the calibration: see the cameras' settings and the program that saved them"
+            }
+        }
+    }
+
+    /// A pair as it would have been found the other way round, each picture with the camera of its side.
     pub fn of_pair(self, board: &Board, rig: &Rig, pair: &PairCorners) -> PairCorners {
-        let [left, right] = [(&rig.left, &pair.left), (&rig.right, &pair.right)]
-            .map(|(camera, corners)| self.of(board, [camera.width, camera.height], corners));
+        let size = |camera: &Camera| [camera.width, camera.height];
+        let [left, right] = match self {
+            Flip::Exchanged => [pair.right.clone(), pair.left.clone()],
+            _ => [(&rig.left, &pair.left), (&rig.right, &pair.right)]
+                .map(|(camera, corners)| self.of(board, size(camera), corners)),
+        };
         PairCorners { pair: pair.pair.clone(), left, right }
     }
 

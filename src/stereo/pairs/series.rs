@@ -147,10 +147,7 @@ fn bundle(
     let mut problem = Problem { views, values, priors: priors.clone() };
     let rig = &mut problem.values.shared.rig;
     (rig.left.lens, rig.right.lens) = (FIRST_LENS, FIRST_LENS);
-    // Twice: the scatter is known only after the first solution.
-    for _ in 0..2 {
-        problem.search_roughly(&Layout::rig(FIRST_LENS, false)).ok_or_else(Error::undetermined)?;
-    }
+    problem.search_roughly(&Layout::rig(FIRST_LENS, false)).ok_or_else(Error::undetermined)?;
     Ok(problem.values.shared)
 }
 

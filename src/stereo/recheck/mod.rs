@@ -88,10 +88,10 @@ pub fn recheck(before: &Before, corners: &Corners) -> Result<Recheck, Error> {
     let (problem, mut skipped, other_way_round) = start(before, corners);
     if problem.views.is_empty()
         && other_way_round.len() >= FEWEST_PAIRS
-        && let Some(&flipped) = other_way_round.first()
-        && other_way_round.iter().all(|other| *other == flipped)
+        && let Some(&flip) = other_way_round.first()
+        && other_way_round.iter().all(|other| *other == flip)
     {
-        return Err(Error::OtherWayRound { flipped: flipped.map(Flip::describe) });
+        return Err(Error::OtherWayRound { how: flip.describe(), remedy: flip.remedy() });
     }
     if problem.views.len() < FEWEST_PAIRS {
         let total = corners.pairs.len() + corners.skipped.len();
@@ -169,17 +169,15 @@ fn strays(
     strays::find(&problem, (board, layout), &rig, usual, lengths)
 }
 
-/// How a pair is the other way round that comes several times nearer to the old rig with its pictures exchanged
-/// (`None` within), or turned or mirrored back: no knock moves a camera to the other side.
-fn other_way_round(before: &Before, board: &Board, shared: &Shared, pair: &PairCorners) -> Option<Option<Flip>> {
+/// How a pair is the other way round that comes several times nearer to the old rig with its pictures exchanged, turned
+/// or mirrored back: no knock moves a camera to the other side.
+fn other_way_round(before: &Before, board: &Board, shared: &Shared, pair: &PairCorners) -> Option<Flip> {
     const NEARER: f64 = 4.0;
     /// Ways of which none comes nearer than the others by so much are not told apart.
     const ALIKE: f64 = 2.0;
     let view = |pair: &PairCorners| numbering::seen_on_rig(shared, board, pair, before.noise.as_ref());
     let miss_px = |pair: &PairCorners| misfit_px(shared, &view(pair)).map_or(f64::INFINITY, |(px, _)| px);
-    let exchanged = PairCorners { pair: pair.pair.clone(), left: pair.right.clone(), right: pair.left.clone() };
-    let flipped = Flip::ALL.map(|flip| (miss_px(&flip.of_pair(board, &before.rig, pair)), Some(flip)));
-    let all: Vec<_> = std::iter::once((miss_px(&exchanged), None)).chain(flipped).collect();
+    let all = Flip::ALL.map(|flip| (miss_px(&flip.of_pair(board, &before.rig, pair)), flip));
     let least_px = all.iter().map(|(px, _)| *px).fold(f64::INFINITY, f64::min);
     // Of cameras that stand alike both pictures turned are nearly the same as both exchanged, which is more usual.
     let (px, how) = all.into_iter().find(|(px, _)| *px <= ALIKE * least_px)?;
@@ -203,7 +201,7 @@ fn step_from_old(solved: &Solved, old: &Values, layout: &Layout) -> Option<(DVec
 
 /// The pairs with the poses that the old rig gives them, from where a rig of their own is looked for; those that are
 /// left out, and of which of these the pictures are the other way round.
-fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, Vec<Option<Flip>>) {
+fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, Vec<Flip>) {
     let shared = Shared { rig: before.rig.clone(), shape_mm: FLAT };
     let mut skipped = corners.skipped.clone();
     let (mut views, mut poses, mut turned) = (Vec::new(), Vec::new(), Vec::new());
@@ -214,12 +212,9 @@ fn start(before: &Before, corners: &Corners) -> (Problem, Vec<Skipped>, Vec<Opti
             skip("its corners give no pose of the board on this rig".to_owned());
             continue;
         };
-        if let Some(how) = other_way_round(before, &corners.board, &shared, pair) {
-            turned.push(how);
-            skip(match how {
-                None => "left and right picture are exchanged: give each the other's name".to_owned(),
-                Some(flip) => format!("its pictures are {}: use them as the cameras wrote them", flip.describe()),
-            });
+        if let Some(flip) = other_way_round(before, &corners.board, &shared, pair) {
+            turned.push(flip);
+            skip(format!("{}: {}", flip.describe(), flip.remedy()));
             continue;
         }
         views.push(view);

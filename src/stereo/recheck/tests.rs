@@ -221,7 +221,8 @@ fn a_pair_with_its_pictures_exchanged_is_left_out_and_named() {
     assert!(skipped.pair == corners.pairs[1].pair && skipped.reason.contains("exchanged"), "{skipped:?}");
     assert!(found.change.is_none() && found.pairs.len() == 2);
     [0, 2].into_iter().for_each(|at| exchange(&mut corners, at));
-    assert!(matches!(recheck(&before, &corners), Err(Error::OtherWayRound { flipped: None })));
+    let said = recheck(&before, &corners);
+    assert!(matches!(said, Err(Error::OtherWayRound { how, .. }) if how == Flip::Exchanged.describe()), "{said:?}");
 }
 
 /// A driver that turns or mirrors what both cameras see, for one pair or for all.
@@ -229,7 +230,7 @@ fn a_pair_with_its_pictures_exchanged_is_left_out_and_named() {
 fn pictures_that_are_turned_or_mirrored_are_named() {
     let before = calibrated(43);
     let clean = after(43, |_| {});
-    for flip in Flip::ALL {
+    for flip in [Flip::Mirrored, Flip::UpsideDown, Flip::HalfTurn] {
         let turned = |at: &[usize]| {
             let mut corners = clean.clone();
             at.iter().for_each(|&at| {
@@ -238,7 +239,7 @@ fn pictures_that_are_turned_or_mirrored_are_named() {
             recheck(&before, &corners)
         };
         let said = turned(&[0, 1, 2]);
-        let is_named = matches!(said, Err(Error::OtherWayRound { flipped: Some(how) }) if how == flip.describe());
+        let is_named = matches!(said, Err(Error::OtherWayRound { how, .. }) if how == flip.describe());
         assert!(is_named, "{said:?}");
         let found = turned(&[1]).unwrap();
         let [skipped] = &found.skipped[..] else { panic!("{:?}", found.skipped) };

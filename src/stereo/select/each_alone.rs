@@ -29,7 +29,8 @@ pub fn lenses(
     paired: Option<&Solved>,
     missed: Missed,
 ) -> Option<KnownLenses> {
-    let [left, right] = [one(start, board, lens, Side::Left)?, one(start, board, lens, Side::Right)?];
+    let near = paired.map_or(&start.values, |paired| &paired.problem.values);
+    let [left, right] = [one(start, near, board, lens, Side::Left)?, one(start, near, board, lens, Side::Right)?];
     // By the lens that was chosen: what a simpler one lacks is not lost in the pairs.
     let alone_px = (0.5 * (left.scatter_px.powi(2) + right.scatter_px.powi(2))).sqrt();
     let missed = paired.map_or(missed, |paired| Missed { times: scatter_px(paired) / alone_px });
@@ -60,10 +61,10 @@ struct Alone {
     scatter_px: f64,
 }
 
-/// One camera by its own pictures.
-fn one(start: &Problem, board: &Board, lens: Lens, side: Side) -> Option<Alone> {
-    let camera = *start.values.shared.rig.camera(side);
-    let shared = Shared { rig: Rig { left: camera, ..start.values.shared.rig.clone() }, shape_mm: FLAT };
+/// One camera by its own pictures, from the one that the pairs give.
+fn one(start: &Problem, near: &Values, board: &Board, lens: Lens, side: Side) -> Option<Alone> {
+    let camera = *near.shared.rig.camera(side);
+    let shared = Shared { rig: Rig { left: camera, ..near.shared.rig.clone() }, shape_mm: FLAT };
     let pictures = start.views.iter().map(|view| as_left(view, side));
     let (views, poses): (Vec<View>, Vec<_>) = pictures
         .filter_map(|picture| Some((board_pose::fit(&shared, &picture)?, picture)))

@@ -117,7 +117,7 @@ fn of_richest(problem: &Problem, scores: &[LensScore], chance: &Chance, board: &
     richer.filter(|trial| 2 * trial.layout.count() <= OF_PAIR * pairs).find_map(
         |Trial { layout, values, priors, .. }| {
             let near = Problem { views: problem.views.clone(), values: values.clone(), priors: priors.clone() };
-            let full = near.solve_near(layout).ok()?;
+            let full = near.solve_on_trial(layout).ok()?;
             let scatter = stated_uncertainty::told_scatter(&full, layout)?;
             let told =
                 Chance { scatter, print: print_excess(&full, layout, board) }.with_taken_up(layout.count(), pairs);

@@ -1,16 +1,14 @@
 //! Models calibrated with all pairs, and compared by how they predict pairs that they have not seen.
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
-use crate::geometry::Transform;
+use crate::geometry::{Transform, perturb};
 use crate::statistics::chi_square_quantile;
 use crate::stereo::Lens;
 use crate::stereo::data::residuals::residual_px;
 use crate::stereo::data::{View, in_use};
-use crate::stereo::init::board_pose;
 use crate::stereo::model::{Layout, Shared, Values};
-use crate::stereo::select::cross_validation;
+use crate::stereo::select::cross_validation::{self, Without};
 use crate::stereo::solve::levenberg_marquardt;
 use crate::stereo::solve::uncertainty::{self, WORST_FOCAL_SIGMA, worst_focal_sigma};
 use crate::stereo::solve::{Equations, Loss, Priors, Problem};
@@ -195,10 +193,13 @@ fn hold_out(problem: &Problem, layout: Layout) -> Option<(Trial, f64)> {
     let fold_of = cross_validation::folds(views, &trial.values.poses);
     let shared = &trial.values.shared;
     let rigs = cross_validation::leave_out(&equations, &equations, &layout, shared, &fold_of, WORST_FOCAL_SIGMA);
-    let rigs = rigs.into_iter().map(|without| Some(without?.shared)).collect::<Option<Vec<Shared>>>()?;
-    let misses: Vec<Option<Miss>> =
-        views.par_iter().enumerate().map(|(i, view)| miss(&rigs[fold_of[i]], view, trial.values.poses[i])).collect();
-    let misses = misses.into_iter().collect::<Option<Vec<Miss>>>()?;
+    let rigs = rigs.into_iter().collect::<Option<Vec<Without>>>()?;
+    let of_pair = |(i, view): (usize, &View)| {
+        let rig = &rigs[fold_of[i]];
+        let pose_step = equations.blocks[i].pose_step(&rig.step)?;
+        miss(&rig.shared, view, &perturb(&trial.values.poses[i], pose_step.as_slice()))
+    };
+    let misses = views.iter().enumerate().map(of_pair).collect::<Option<Vec<Miss>>>()?;
     let squares: f64 = misses.iter().map(|miss| miss.squares_px2).sum();
     let corners: u32 = misses.iter().map(|miss| miss.corners).sum();
     let by_pair = misses.iter().map(|miss| miss.loss).collect();
@@ -211,12 +212,11 @@ struct Miss {
     loss: f64,
 }
 
-/// What a rig leaves of a pair that it has not seen; `near` is a pose close to the pair's.
-fn miss(shared: &Shared, view: &View, near: Transform) -> Option<Miss> {
-    let left_from_board = board_pose::follow(shared, view, near)?;
+/// What a rig leaves of a pair that it has not seen.
+fn miss(shared: &Shared, view: &View, left_from_board: &Transform) -> Option<Miss> {
     let mut sum = Miss { squares_px2: 0.0, corners: 0, loss: 0.0 };
     for o in view.observations.iter().filter(|o| o.active) {
-        let r = residual_px(shared, &left_from_board, o)?;
+        let r = residual_px(shared, left_from_board, o)?;
         sum.squares_px2 += r.norm_squared();
         sum.loss += o.whiten(r).norm_squared();
         sum.corners += 1;

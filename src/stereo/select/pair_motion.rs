@@ -19,9 +19,10 @@ use crate::stereo::solve::Problem;
 use crate::stereo::solve::normal_equations::{Block, Equations};
 use crate::stereo::solve::uncertainty::invert;
 
-/// Rounds after which variances that are there have settled, and those that are not have fallen to a few hundredths of
-/// what the noise hides.
+/// Rounds at the most, and the share of a variance and the noise beside it that is no change any more: variances that
+/// are there have settled then, and those that are not have fallen to a few hundredths of what the noise hides.
 const ROUNDS: usize = 100;
+const STILL: f64 = 3e-4;
 
 /// Chance that pairs which move as is known are said not to.
 const CHANCE: f64 = 1e-3;
@@ -84,26 +85,48 @@ fn in_units_of_noise(equations: &Equations, inflation: f64) -> Option<(Vec<Told>
     Some((pairs, prior))
 }
 
+/// What the motions of the pairs pull at the shared numbers, six columns a pair, and what all pairs tell.
+struct Pulls {
+    columns: DMatrix<f64>,
+    all: Told,
+}
+
+impl Pulls {
+    fn new(pairs: &[Told], at: usize) -> Option<Pulls> {
+        let n = pairs.first()?.gradient.len();
+        let mut all = Told { matrix: DMatrix::zeros(n, n), gradient: DVector::zeros(n) };
+        let mut columns = DMatrix::zeros(n, 6 * pairs.len());
+        for (i, pair) in pairs.iter().enumerate() {
+            columns.columns_mut(6 * i, 6).copy_from(&pair.matrix.columns(at, 6));
+            all.matrix += &pair.matrix;
+            all.gradient += &pair.gradient;
+        }
+        Some(Pulls { columns, all })
+    }
+}
+
 /// What the pairs tell of the shared numbers where each has a motion of its own with these variances.
 struct Weighed {
     /// Of each pair's motion, where the shared numbers are known.
     spreads: Vec<Matrix6<f64>>,
-    matrix: DMatrix<f64>,
-    gradient: DVector<f64>,
+    /// How each pair's motion follows the shared numbers, six columns a pair.
+    through: DMatrix<f64>,
+    told: Told,
 }
 
 impl Weighed {
-    fn new(pairs: &[Told], at: usize, variances: &Vector6<f64>) -> Option<Weighed> {
+    fn new(pairs: &[Told], pulls: &Pulls, at: usize, variances: &Vector6<f64>) -> Option<Weighed> {
         let drawn = Matrix6::from_diagonal(&variances.map(|v| 1.0 / v));
         let spreads = pairs.iter().map(|pair| (link(pair, at) + drawn).try_inverse()).collect::<Option<Vec<_>>>()?;
-        let n = pairs.first()?.gradient.len();
-        let (mut matrix, mut gradient) = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for (pair, spread) in pairs.iter().zip(&spreads) {
-            let through = pair.matrix.columns(at, 6) * spread;
-            matrix += &pair.matrix - &through * pair.matrix.rows(at, 6);
-            gradient += &pair.gradient - &through * pair.gradient.fixed_rows::<6>(at);
+        let mut through = pulls.columns.clone();
+        let mut gradient = pulls.all.gradient.clone();
+        for (i, (pair, spread)) in pairs.iter().zip(&spreads).enumerate() {
+            let own = pulls.columns.fixed_columns::<6>(6 * i) * spread;
+            gradient -= &own * pair.gradient.fixed_rows::<6>(at);
+            through.fixed_columns_mut::<6>(6 * i).copy_from(&own);
         }
-        Some(Weighed { spreads, matrix, gradient })
+        let matrix = &pulls.all.matrix - &through * pulls.columns.transpose();
+        Some(Weighed { spreads, through, told: Told { matrix, gradient } })
     }
 }
 
@@ -124,7 +147,7 @@ pub fn weighed(
     let mut covariance = None;
     for _ in 0..STEPS {
         let (pairs, prior) = in_units_of_noise(&problem.equations(layout)?, inflation)?;
-        let by_pairs = Weighed::new(&pairs, at, &known.variances)?;
+        let by_pairs = Weighed::new(&pairs, &Pulls::new(&pairs, at)?, at, &known.variances)?.told;
         let shared = invert(&(&by_pairs.matrix + &prior.matrix))?;
         let step = -&shared * (&by_pairs.gradient + &prior.gradient);
         if !moves_as_known(&pairs, at, &step, known) {
@@ -186,20 +209,24 @@ fn by_noise(pairs: &[Told], at: usize) -> Vector6<f64> {
 /// for (restricted likelihood). The six begin with number `at` of the shared ones.
 fn variances(pairs: &[Told], prior: &Told, at: usize) -> Option<Vector6<f64>> {
     let count = pairs.len() as f64;
-    let mut variances = by_noise(pairs, at);
+    let pulls = Pulls::new(pairs, at)?;
+    let noise = by_noise(pairs, at);
+    let mut variances = noise;
     for _ in 0..ROUNDS {
-        let Weighed { spreads, matrix, gradient } = Weighed::new(pairs, at, &variances)?;
-        let shared = invert(&(matrix + &prior.matrix))?;
-        let step = -&shared * (gradient + &prior.gradient);
+        let Weighed { spreads, through, told } = Weighed::new(pairs, &pulls, at, &variances)?;
+        let shared = invert(&(told.matrix + &prior.matrix))?;
+        let step = -&shared * (told.gradient + &prior.gradient);
+        let (followed, open) = (through.tr_mul(&step), (&shared * &through).component_mul(&through).row_sum());
         let mut sum = Vector6::zeros();
-        for (pair, spread) in pairs.iter().zip(&spreads) {
-            let rows = pair.matrix.rows(at, 6);
-            let motion = spread * (pair.gradient.fixed_rows::<6>(at) + rows * &step);
-            let through = spread * rows;
-            let open = spread + &through * &shared * through.transpose();
-            sum += motion.component_mul(&motion) + open.diagonal();
+        for (i, (pair, spread)) in pairs.iter().zip(&spreads).enumerate() {
+            let motion = spread * pair.gradient.fixed_rows::<6>(at) + followed.fixed_rows::<6>(6 * i);
+            let open = spread.diagonal() + open.fixed_columns::<6>(6 * i).transpose();
+            sum += motion.component_mul(&motion) + open;
         }
-        variances = sum / count;
+        let before = std::mem::replace(&mut variances, sum / count);
+        if (variances - before).component_div(&(variances + noise)).amax() < STILL {
+            break;
+        }
     }
     Some(variances)
 }

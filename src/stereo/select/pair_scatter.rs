@@ -69,7 +69,7 @@ impl Jackknife<'_> {
         // Of the step without a group what the others tell.
         let told: Vec<DMatrix<f64>> = without
             .iter()
-            .map(|w| told_by_others(&(&inverse_root * &w.covariance * inverse_root.transpose() * inflation)))
+            .map(|w| told_by_others(&inverse_root * &w.covariance * inverse_root.transpose() * inflation))
             .collect();
         let steps: Vec<DVector<f64>> = without
             .iter()
@@ -87,7 +87,7 @@ impl Jackknife<'_> {
             let information = in_group.fold(DMatrix::zeros(n, n), |sum, (m, _)| sum + m);
             let gradient = &information - &information * &own * &information;
             let step = &told[group] * &inverse_root * &without.covariance * slope;
-            expected += inflation * correction * (&step * gradient * step.transpose()).trace();
+            expected += inflation * correction * (&step * gradient).dot(&step);
         }
         let scatter = steps.iter().fold(DMatrix::zeros(n, n), |sum, x| sum + x * x.transpose()) / groups as f64;
         let stretch = (expected / n as f64).max(1.0);
@@ -114,11 +114,15 @@ impl Jackknife<'_> {
 /// Projection on the directions that the rig without a group knows hardly worse than the one with it; `covariance` is
 /// its in units of the latter's. What a group alone tells (the distortion at a border that one pair reaches) no other
 /// pair checks: without it those numbers go anywhere, and a step there says nothing of how pairs scatter.
-fn told_by_others(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+fn told_by_others(covariance: DMatrix<f64>) -> DMatrix<f64> {
     /// Most by which the variance grows in a direction that the others tell, too.
     const MOST_GROWTH: f64 = 100.0;
     let n = covariance.nrows();
-    let eigen = (0.5 * (covariance + covariance.transpose())).symmetric_eigen();
+    // No variance in any direction is larger than this norm.
+    if covariance.norm() <= MOST_GROWTH {
+        return DMatrix::identity(n, n);
+    }
+    let eigen = (0.5 * (&covariance + covariance.transpose())).symmetric_eigen();
     let lost = (0..n).filter(|&i| eigen.eigenvalues[i] > MOST_GROWTH).map(|i| eigen.eigenvectors.column(i));
     lost.fold(DMatrix::identity(n, n), |kept, direction| kept - direction * direction.transpose())
 }
@@ -172,7 +176,7 @@ mod tests {
         let kept = |growth: f64| {
             let covariance =
                 &turn * DMatrix::from_diagonal(&DVector::from_vec(vec![1.2, growth, 3.0])) * turn.transpose();
-            told_by_others(&covariance) * DVector::from_vec(vec![1.0, 2.0, 3.0])
+            told_by_others(covariance) * DVector::from_vec(vec![1.0, 2.0, 3.0])
         };
         assert!((kept(50.0) - DVector::from_vec(vec![1.0, 2.0, 3.0])).norm() < 1e-12);
         let lost = turn.column(1) * turn.column(1).dot(&DVector::from_vec(vec![1.0, 2.0, 3.0]));

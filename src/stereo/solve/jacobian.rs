@@ -7,7 +7,7 @@ use crate::imaging::Side;
 use crate::stereo::data::Observation;
 use crate::stereo::model::Layout;
 use crate::stereo::model::board_shape;
-use crate::stereo::model::projection::CAMERA_NUMBERS;
+use crate::stereo::model::projection::{CAMERA_NUMBERS, Tilt};
 use crate::stereo::solve::Loss;
 use crate::stereo::solve::gram_matrix::WIDEST;
 use crate::stereo::{Camera, Rig};
@@ -43,6 +43,7 @@ impl Packing {
 /// A picture's camera and the ways there from the board, as matrices.
 pub struct Way<'a> {
     camera: &'a Camera,
+    tilt: Option<Tilt>,
     left_turn: Matrix3<f64>,
     left_shift: Vector3<f64>,
     /// `right_from_left` for the right picture.
@@ -70,7 +71,7 @@ impl<'a> Way<'a> {
             Side::Right => (&rig.right, Some((rotation_matrix(right), right.translation.vector))),
         };
         let (left_turn, left_shift) = (rotation_matrix(left_from_board), left_from_board.translation.vector);
-        Way { camera, left_turn, left_shift, on }
+        Way { camera, tilt: camera.tilt(), left_turn, left_shift, on }
     }
 
     /// Derivatives by the point on the board.
@@ -91,7 +92,7 @@ impl<'a> Way<'a> {
                 (turned_on, turned_on + shift)
             }
         };
-        let projection = self.camera.project_with_derivatives(&in_camera.into())?;
+        let projection = self.camera.project_through(self.tilt.as_ref(), &in_camera.into())?;
         let residual = o.whiten(projection.px - o.px);
         // A lens model can overflow far outside the picture.
         if !(residual.x.is_finite() && residual.y.is_finite()) {

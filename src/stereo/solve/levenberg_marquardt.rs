@@ -7,11 +7,12 @@
 //! through a camera; unknowns that the views do not determine (no covariance then).
 
 use std::collections::VecDeque;
+use std::slice;
 
 use nalgebra::{DVector, Vector6};
 use rayon::prelude::*;
 
-use crate::geometry::perturb;
+use crate::geometry::{Transform, perturb};
 use crate::stereo::data::View;
 use crate::stereo::model::{Layout, Values};
 use crate::stereo::solve::normal_equations::{self, Block};
@@ -47,8 +48,12 @@ pub struct Search {
 }
 
 impl Search {
-    /// A start for another search: from afar, to about a tenth of a standard deviation.
-    pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-7, most_steps: 50 };
+    /// A start for another search: from afar, to about a standard deviation.
+    pub const ROUGH: Search = Search { first_damping: 1e-4, cost_share: 1e-5, most_steps: 50 };
+    /// A pose by itself, within another search.
+    const POSE: Search = Search { first_damping: 1e-4, cost_share: 1e-6, most_steps: 30 };
+    /// While the corners' weights are looked for: to about a tenth of a standard deviation.
+    pub const WEIGHTS: Search = Search { first_damping: 1e-9, cost_share: 1e-6, most_steps: 100 };
     /// From a minimum of nearly the same problem to the limit of rounding.
     pub const NEAR: Search = Search { first_damping: 1e-9, cost_share: 1e-13, most_steps: 400 };
     /// The same with a robust loss, to a thousandth of a standard deviation: what squares of the same weights then reach
@@ -85,8 +90,8 @@ pub struct Solution {
 
 /// Minimises with what is expected of the shared numbers. Views and `start.poses` correspond by place.
 pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, loss: Loss, search: Search) -> Solution {
-    let of = |values: &Values| equations(views, layout, priors, values, loss);
-    let Some(mut equations) = of(&start) else {
+    let problem = Robust { views, layout, priors, loss };
+    let Some(mut equations) = problem.equations(&start) else {
         return Solution { values: start, cost: f64::INFINITY, stop: Stop::Elsewhere, steps: 0 };
     };
     let mut values = start;
@@ -98,7 +103,8 @@ pub fn solve(views: &[View], layout: &Layout, priors: &Priors, start: Values, lo
     for steps in 1..=search.most_steps {
         let mut accepted = false;
         let at = (&values, &equations, cost);
-        if let Some(Attempt { values: trial, equations: next, predicted_gain }) = attempt(&of, layout, at, damping) {
+        let attempt = problem.attempt(at, damping, steps > LATELY);
+        if let Some(Attempt { values: trial, equations: next, predicted_gain }) = attempt {
             let gain = next.as_ref().map_or(f64::NEG_INFINITY, |next| cost - next.cost());
             if let Some(next) = next.filter(|_| gain >= 0.0) {
                 values = trial;
@@ -146,31 +152,63 @@ struct Attempt {
     predicted_gain: f64,
 }
 
-/// A step from these values with their equations and cost. `None` where the equations have no solution with this
-/// damping.
-fn attempt(
-    of: &impl Fn(&Values) -> Option<Equations>,
-    layout: &Layout,
-    (values, equations, cost): (&Values, &Equations, f64),
-    damping: f64,
-) -> Option<Attempt> {
-    let (values, predicted_gain) = try_step(layout, values, equations, damping)?;
-    let mut reached = Attempt { equations: of(&values), values, predicted_gain };
-    if let Some(there) = reached.equations.as_mut().filter(|there| cost - there.cost() < FORETOLD * predicted_gain) {
-        // What bends is mostly the poses' part in it: they follow the shared numbers by a step of their own, each where
-        // that is nearer, for the pose of a pair whose corners contradict each other jumps.
-        let followed = with_poses_following(&reached.values, there);
-        let then = followed.as_ref().and_then(of);
-        if let Some((followed, then)) = followed.zip(then) {
-            let own = reached.values.poses.iter_mut().zip(&mut there.blocks);
-            for ((pose, block), (follows, then)) in own.zip(followed.poses.into_iter().zip(then.blocks)) {
-                if then.cost < block.cost {
-                    (*pose, *block) = (follows, then);
+/// What a search minimises.
+struct Robust<'a> {
+    views: &'a [View],
+    layout: &'a Layout,
+    priors: &'a Priors,
+    loss: Loss,
+}
+
+impl Robust<'_> {
+    fn equations(&self, values: &Values) -> Option<Equations> {
+        equations(self.views, self.layout, self.priors, values, self.loss)
+    }
+
+    /// A step from these values with their equations and cost; of a search that has gone on for `long` with a search
+    /// for each pose. `None` where the equations have no solution with this damping.
+    fn attempt(
+        &self,
+        (values, equations, cost): (&Values, &Equations, f64),
+        damping: f64,
+        long: bool,
+    ) -> Option<Attempt> {
+        let (values, predicted_gain) = try_step(self.layout, values, equations, damping)?;
+        let mut reached = Attempt { equations: self.equations(&values), values, predicted_gain };
+        if let Some(there) = reached.equations.as_mut().filter(|there| cost - there.cost() < FORETOLD * predicted_gain)
+        {
+            // What bends is mostly the poses' part in it: they follow the shared numbers, each where that is nearer,
+            // for the pose of a pair whose corners contradict each other jumps. A step does for most; a small board
+            // that faces its camera has two poses beside each other and no slope between them.
+            let followed = if long && self.layout.count() > 0 {
+                Some(self.with_poses_searched(&reached.values))
+            } else {
+                with_poses_following(&reached.values, there)
+            };
+            let then = followed.as_ref().and_then(|followed| self.equations(followed));
+            if let Some((followed, then)) = followed.zip(then) {
+                let own = reached.values.poses.iter_mut().zip(&mut there.blocks);
+                for ((pose, block), (follows, then)) in own.zip(followed.poses.into_iter().zip(then.blocks)) {
+                    if then.cost < block.cost {
+                        (*pose, *block) = (follows, then);
+                    }
                 }
             }
         }
+        Some(reached)
     }
-    Some(reached)
+
+    /// The values with each pose where its pair's cost is least with these shared numbers.
+    fn with_poses_searched(&self, values: &Values) -> Values {
+        let pose = |(view, pose): (&View, &Transform)| {
+            let alone = Values { shared: values.shared.clone(), poses: vec![*pose] };
+            let found =
+                solve(slice::from_ref(view), &Layout::POSES_ONLY, &Priors::NONE, alone, self.loss, Search::POSE);
+            found.values.poses.first().copied().unwrap_or(*pose)
+        };
+        let poses = self.views.par_iter().zip(&values.poses).map(pose).collect();
+        Values { shared: values.shared.clone(), poses }
+    }
 }
 
 /// How the damping changes after a step that gained this share of its prediction. Gauss-Newton overshoots along weak

@@ -95,6 +95,12 @@ impl Block {
         Some((&self.shared - &through * self.mixed.transpose(), &self.shared_gradient - &through * self.pose_gradient))
     }
 
+    /// The pose's own Gauss-Newton step where the shared numbers take this one. `None` where the corners do not
+    /// determine the pose.
+    pub fn pose_step(&self, shared: &DVector<f64>) -> Option<Vector6<f64>> {
+        Some(-(self.pose_inverse(0.0)? * (self.pose_gradient + self.mixed.tr_mul(shared))))
+    }
+
     /// `C^-1`, the pose's own diagonal stretched by `1 + damping`. `None` where the corners do not determine the pose.
     pub fn pose_inverse(&self, damping: f64) -> Option<Matrix6<f64>> {
         let mut damped = self.pose;

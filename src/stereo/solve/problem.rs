@@ -69,10 +69,7 @@ impl Problem {
         if 2 * corners <= unknowns {
             return Err(Error::TooFewCorners { corners, unknowns });
         }
-        // Twice: the scatter is known only after the first solution.
-        for _ in 0..2 {
-            problem.search_roughly(layout).ok_or_else(unseen)?;
-        }
+        problem.search_roughly(layout).ok_or_else(unseen)?;
         problem.solve_near(layout)
     }
 
@@ -87,11 +84,22 @@ impl Problem {
         solve(forced.unwrap_or(true)).or_else(|_| solve(forced.unwrap_or(false)))
     }
 
-    /// Moves the values by a robust search with corners that weigh by what these values leave of them. `None` where one
-    /// lies behind its camera.
+    /// Moves the values by a robust search with corners that weigh by what is left of them: before it, and once more
+    /// where that was much more than after it. `None` where a corner lies behind its camera.
     pub fn search_roughly(&mut self, layout: &Layout) -> Option<()> {
-        Noise::from_median(&residuals::active(&self.views, &self.values)?).apply(&mut self.views);
-        self.values = self.search(layout, Loss::Cauchy, Search::ROUGH).values;
+        /// What corners scatter by changes their weights by no more than their own scatter does.
+        const MUCH: f64 = 1.5;
+        let scatter =
+            |problem: &Problem| Some(Noise::from_median(&residuals::active(&problem.views, &problem.values)?));
+        let mut noise = scatter(self)?;
+        for _ in 0..2 {
+            noise.apply(&mut self.views);
+            self.values = self.search(layout, Loss::Cauchy, Search::ROUGH).values;
+            let before = std::mem::replace(&mut noise, scatter(self)?);
+            if before.typical_px(&self.views) < MUCH * noise.typical_px(&self.views) {
+                break;
+            }
+        }
         Some(())
     }
 
@@ -113,16 +121,23 @@ impl Problem {
 
     /// Solves from values near the minimum: without the robust search.
     pub fn solve_near(&self, layout: &Layout) -> Result<Solved, Error> {
+        self.solve_to(layout, [Search::ROBUST, Search::NEAR])
+    }
+
+    /// The same of a model on trial.
+    pub fn solve_on_trial(&self, layout: &Layout) -> Result<Solved, Error> {
+        self.solve_to(layout, [Search::WEIGHTS, Search::TRIAL])
+    }
+
+    /// The same with these last searches: with the loss, and by its weights.
+    fn solve_to(&self, layout: &Layout, [by_loss, by_weights]: [Search; 2]) -> Result<Solved, Error> {
         let mut problem = self.with_layout(layout);
         let unknowns = layout.count() + 6 * problem.views.len();
         let (mut noise, mut loss) = Noise::likeliest(&problem.left()?, unknowns);
         for _ in 0..MOST_ROUNDS {
             noise.apply(&mut problem.views);
-            // With a robust loss the last word is that of the weighted squares below.
-            problem.values = match loss {
-                Loss::Squared => converged(problem.search(layout, loss, Search::NEAR))?,
-                _ => problem.search(layout, loss, Search::ROBUST).values,
-            };
+            // What is left of the way changes the scatter by its square.
+            problem.values = problem.search(layout, loss, Search::WEIGHTS).values;
             let before = (noise, loss);
             (noise, loss) = Noise::likeliest(&problem.left()?, unknowns);
             let moved = |a: f64, b: f64| (a - b).abs() > 1e-4 * b;
@@ -131,13 +146,16 @@ impl Problem {
             }
         }
         noise.apply(&mut problem.views);
+        if loss != Loss::Squared {
+            problem.values = problem.search(layout, loss, by_loss).values;
+        }
         let left = problem.left()?;
         let log_likelihood = noise.log_likelihood(&left, loss);
         let loss_factor = loss.variance_factor(left.iter().map(|(o, r)| o.whiten(*r).norm_squared()));
         if loss != Loss::Squared {
-            weigh(&mut problem.views, &problem.values, loss);
-            problem.values = converged(problem.search(layout, Loss::Squared, Search::NEAR))?;
+            put_weights_in(&mut problem.views, &problem.values, loss);
         }
+        problem.values = converged(problem.search(layout, Loss::Squared, by_weights))?;
         let rms_px = residuals::root_mean_square(left.iter().map(|(_, r)| r.norm_squared())).unwrap_or(0.0);
         Ok(Solved { problem, noise, loss, loss_factor, log_likelihood, rms_px })
     }
@@ -221,11 +239,11 @@ fn converged(solution: Solution) -> Result<Values, Error> {
 }
 
 /// Puts the weights of a loss into the whiteners, so that the minimum is that of the weighted squares.
-fn weigh(views: &mut [View], values: &Values, loss: Loss) {
+fn put_weights_in(views: &mut [View], values: &Values, loss: Loss) {
     for (view, pose) in views.iter_mut().zip(&values.poses) {
         for o in &mut view.observations {
             let squared = residuals::residual_px(&values.shared, pose, o).map_or(0.0, |r| o.whiten(r).norm_squared());
-            o.whitener *= loss.cost_and_weight(squared).1.sqrt();
+            o.whitener *= loss.weight(squared).sqrt();
         }
     }
 }

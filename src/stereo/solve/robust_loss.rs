@@ -15,17 +15,22 @@ pub enum Loss {
 }
 
 impl Loss {
-    /// Cost and weight (its slope) at a squared residual.
+    /// Cost and weight at a squared residual.
     pub fn cost_and_weight(self, squared: f64) -> (f64, f64) {
+        let cost = match self {
+            Loss::Squared => 0.5 * squared,
+            Loss::Cauchy => 0.5 * CAUCHY_WIDTH * CAUCHY_WIDTH * (squared / (CAUCHY_WIDTH * CAUCHY_WIDTH)).ln_1p(),
+            Loss::Student(freedom) => 0.5 * (freedom + 2.0) * (squared / freedom).ln_1p(),
+        };
+        (cost, self.weight(squared))
+    }
+
+    /// How much a corner counts: twice the slope of its cost.
+    pub fn weight(self, squared: f64) -> f64 {
         match self {
-            Loss::Squared => (0.5 * squared, 1.0),
-            Loss::Cauchy => {
-                let c2 = CAUCHY_WIDTH * CAUCHY_WIDTH;
-                (0.5 * c2 * (squared / c2).ln_1p(), 1.0 / (1.0 + squared / c2))
-            }
-            Loss::Student(freedom) => {
-                (0.5 * (freedom + 2.0) * (squared / freedom).ln_1p(), (freedom + 2.0) / (freedom + squared))
-            }
+            Loss::Squared => 1.0,
+            Loss::Cauchy => 1.0 / (1.0 + squared / (CAUCHY_WIDTH * CAUCHY_WIDTH)),
+            Loss::Student(freedom) => (freedom + 2.0) / (freedom + squared),
         }
     }
 
@@ -58,7 +63,7 @@ impl Loss {
         let Loss::Student(freedom) = self else { return 1.0 };
         let (mut count, mut weights, mut bread, mut meat) = (0.0, 0.0, 0.0, 0.0);
         for squared in squares {
-            let weight = self.cost_and_weight(squared).1;
+            let weight = self.weight(squared);
             count += 1.0;
             weights += weight;
             bread += weight * freedom / (freedom + squared);

@@ -7,6 +7,7 @@ use stereocal::simulate::world::World;
 use stereocal::stereo::board_pose::rig_change::judgement::Judgement;
 use stereocal::stereo::board_pose::series::measure;
 use stereocal::stereo::board_pose::{Knowledge, Seen, Series};
+use stereocal::stereo::pairs::flip::Flip;
 
 use crate::faults::{degrees, worst};
 use crate::worlds::{changing_knowledge, changing_run, knowledge, world};
@@ -120,7 +121,7 @@ const LINES: [Line; 7] = [
             mirror(w, &mut seen);
             Some((known, seen))
         },
-        is_reason: |judgement, _| matches!(judgement, Judgement::Mirrored(_)),
+        is_reason: |judgement, _| matches!(judgement, Judgement::OtherWayRound(Flip::Mirrored)),
         clean: false,
     },
     Line {

@@ -24,10 +24,7 @@ pub(in crate::stereo::board_pose) fn misfit_px(rig: &Rig, views: &[View], starts
     }
     let shared = Shared { rig: rig.clone(), shape_mm: FLAT };
     let mut found = Problem { views, values: Values { shared, poses }, priors: Priors::NONE };
-    // Twice: the scatter is known only after the first solution.
-    for _ in 0..2 {
-        found.search_roughly(&PLACE)?;
-    }
+    found.search_roughly(&PLACE)?;
     let Values { shared, poses } = &found.values;
     let left = |(view, pose): (&View, &Transform)| {
         let each = Side::BOTH.into_iter().filter_map(|side| rms_px(shared, pose, view, side));

@@ -16,10 +16,8 @@ pub enum Judgement {
     Allowed(Changed),
     /// It is not the rig that was calibrated, or the target is not the one described.
     Contradicts(Changed),
-    /// Left and right pictures are exchanged.
-    Exchanged,
-    /// All pictures are the other way round.
-    Mirrored(Flip),
+    /// All pairs are the other way round.
+    OtherWayRound(Flip),
     /// It moved during the run.
     Moved {
         /// First pose after it.
@@ -81,11 +79,8 @@ impl Judgement {
                     ", or by {mm:.3} mm if the target is as was said and the rig is scaled"
                 ))
             ),
-            Judgement::Exchanged => {
-                "left and right pictures are exchanged: they fit this rig the other way round".to_owned()
-            }
-            Judgement::Mirrored(flip) => {
-                format!("all pictures are {}: they fit this rig the other way round", flip.describe())
+            Judgement::OtherWayRound(flip) => {
+                format!("{}: they fit this rig the other way round", flip.describe())
             }
             Judgement::Moved { since, creeps, turned_deg, moved_mm } => {
                 let (turned_deg, moved_mm) = (two_digits(*turned_deg), two_digits(*moved_mm));
@@ -133,10 +128,7 @@ impl Judgement {
                 "check `--square-mm` and `--squares` against the target; if they are right, the rig changed, or its own board's squares were not as was said: \
                  `stereocal camera-check IMAGES --square-mm MM`",
             ),
-            Judgement::Exchanged => Some("exchange the names of left/ and right/"),
-            Judgement::Mirrored(_) => Some(
-                "take the pictures as the cameras give them, as at the calibration: see the cameras' settings and the program that saved them",
-            ),
+            Judgement::OtherWayRound(flip) => Some(flip.remedy()),
             Judgement::Moved { .. } | Judgement::Loose { .. } => Some(
                 "clamp the cameras, calibrate again with `stereocal camera-check IMAGES`, and take the poses from there on again",
             ),

@@ -34,7 +34,6 @@ pub fn ledger(case: &Case) -> Vec<Evidence> {
         pairs::tilts(case),
     ];
     lines.extend(lengths::along_sight(case));
-    lines.extend(pairs::board_since(case));
     lines.extend(pairs::focal_lengths(case));
     lines.extend(pairs::baseline(case));
     lines.extend(lengths::tolerance(case));

@@ -13,17 +13,26 @@ use crate::stereo::judge::verdict::Verdict;
 use crate::stereo::pairs::Cause;
 use crate::stereo::solve::uncertainty::{WORST_FOCAL_SIGMA, worst_focal_sigma};
 
-/// Steps and drifts that are in the rig.
+/// Steps and drifts that are in the rig, and a step to it that may as well be one of the board: of two boards one has
+/// another size than was said, and no pictures tell which.
 pub(super) fn findings(case: &Case) -> Evidence {
     let since = case.calibration.standing.since.as_deref();
-    let within = |finding: &&Finding| finding.pairs.first().map(String::as_str) != since || since.is_none();
-    let left: Vec<&Finding> = case.facts.findings.iter().filter(within).collect();
+    let is_before = |finding: &Finding| since.is_some() && finding.pairs.first().map(String::as_str) == since;
+    let may_be_board =
+        |finding: &&Finding| is_before(finding) && finding.kind == Kind::Step && finding.may_be(Cause::OtherBoard);
+    let counts = |finding: &&Finding| !is_before(finding) || may_be_board(finding);
+    let left: Vec<&Finding> = case.facts.findings.iter().filter(counts).collect();
+    let of_board = left.iter().copied().find(may_be_board);
     let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
     let detail = if left.is_empty() {
         "no change during the series: no step, drift or change of focus beyond their scatter".to_owned()
     } else {
         let told: Vec<&str> = left.iter().map(|finding| finding.action.as_str()).collect();
-        let effect = if left.iter().any(|finding| finding.effect_mm.is_some()) {
+        let effect = if of_board.is_some() {
+            "If the boards before and since are two, one of them is not as large as was said, and the pictures do not tell which: all lengths may \
+             be off with it. If one board was photographed throughout, no length is off"
+                .to_owned()
+        } else if left.iter().any(|finding| finding.effect_mm.is_some()) {
             format!(
                 "It is included in the uncertainty of the rig; a change of a length of less than {:.0} % of the tolerance does not affect the verdict",
                 100.0 * MATERIAL_SHARE
@@ -34,9 +43,12 @@ pub(super) fn findings(case: &Case) -> Evidence {
         format!("{}. {effect}", told.join("; "))
     };
     let board_moved = |finding: &&Finding| finding.cause == Cause::NotSimultaneous.word();
-    let remedy = match left.iter().all(board_moved) && !left.is_empty() {
-        true => "hold the board still while its pictures are taken, and photograph again",
-        false => "clamp the cameras, switch autofocus off, and photograph again",
+    let remedy = if of_board.is_some() {
+        "measure the squares of the board that was photographed since then, and name its first pair with `--since`"
+    } else if !left.is_empty() && left.iter().all(board_moved) {
+        "hold the board still while its pictures are taken, and photograph again"
+    } else {
+        "clamp the cameras, switch autofocus off, and photograph again"
     };
     Evidence::of_length("changes over the pairs", remedy, Some(value), case, detail)
 }
@@ -106,25 +118,6 @@ pub(super) fn standing(case: &Case) -> Evidence {
     };
     let (what, remedy) = ("last pairs that contradict the rig", "add pairs of the rig as it stands");
     Evidence::of_doubt(what, remedy, [after.len() as f64, 0.0], "", after.is_empty(), detail)
-}
-
-/// A rig since a step that may as well be one of the board: of two boards one has another size than was said, and no
-/// pictures tell which.
-pub(super) fn board_since(case: &Case) -> Option<Evidence> {
-    let since = case.calibration.standing.since.as_ref()?;
-    let may_be_board = |finding: &&Finding| {
-        finding.kind == Kind::Step && finding.pairs.first() == Some(since) && finding.may_be(Cause::OtherBoard)
-    };
-    let finding = case.facts.findings.iter().find(may_be_board)?;
-    let detail = format!(
-        "{}. If the boards before and since are two, one of them is not as large as was said, and the pictures do not tell which: all lengths \
-         may be off with it. If one board was photographed throughout, no length is off",
-        finding.action
-    );
-    let remedy =
-        "measure the squares of the board that was photographed since then, and name its first pair with `--since`";
-    let figures = [finding.effect_mm.unwrap_or(f64::INFINITY), MATERIAL_SHARE * case.facts.tolerance_mm];
-    Some(Evidence::of_doubt("board of the rig since it changed", remedy, figures, "mm", false, detail))
 }
 
 pub(super) fn poses(case: &Case) -> Evidence {
