@@ -32,7 +32,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     };
     let before = earlier(&cli.command, &config);
     let now = || before.as_ref().and_then(|earlier| Earlier::of(&earlier.file));
-    // On one of the threads: a short loop that another one begins would wait longer for them to wake than for its result.
+    // On one of the threads: a short loop would else wait longer for them to wake than for its result.
     rayon::scope(|_| command(&cli.command, &config, run)).map_err(|error| {
         match now().filter(|now| before.as_ref() == Some(now)) {
             Some(earlier) => Error::BesideEarlier(Box::new(BesideEarlier { error, earlier })),

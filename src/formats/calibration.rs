@@ -19,6 +19,7 @@ use crate::stereo::data::corner_noise::Noise;
 use crate::stereo::judge::assessment::Judged;
 use crate::stereo::judge::moves::KnownMove;
 use crate::stereo::model::rig::{Covariance, Rig};
+use crate::stereo::recheck::again::{self, Ends};
 use crate::stereo::volume::Volume;
 use crate::stereo::{Camera, Lens};
 
@@ -54,6 +55,9 @@ pub struct CalibrationFile {
     /// How far black has spread on it, where that moves its corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     board_spread: Option<SpreadRecord>,
+    /// Where each pair that was used had the first and the last corner of its left picture.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    ends_px: Vec<Ends>,
     /// Whether the last pairs confirmed the rig; empty where they did.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     unconfirmed: Vec<String>,
@@ -97,6 +101,8 @@ pub struct Calibrated {
     pub volume: Option<Volume>,
     pub check: Option<Check>,
     pub board: Option<Board>,
+    /// Where each pair that was used had the first and the last corner of its left picture.
+    pub ends_px: Vec<Ends>,
     /// The calibration's last pairs, where they contradict the rig.
     pub unconfirmed: Vec<String>,
 }
@@ -241,6 +247,7 @@ impl CalibrationFile {
             length_mm: Some(facts.volume.length_mm),
         });
         self.volume = Some(facts.volume.volume.clone());
+        self.ends_px = calibration.views.iter().filter_map(again::of_view).collect();
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();
         self.corner_noise = Some(NoiseRecord {
@@ -364,6 +371,7 @@ pub fn read(path: &Utf8Path) -> Result<Calibrated> {
         board: file.board.as_ref().and_then(|name| name.parse().ok()),
         volume: file.volume,
         check: file.check,
+        ends_px: file.ends_px,
         unconfirmed: file.unconfirmed,
     })
 }

@@ -17,6 +17,7 @@ pub fn standing(recheck: &Recheck, tolerance_mm: f64, own_data: bool) -> Standin
         _ if own_data => Standing::OwnData,
         _ if !recheck.extrapolated.is_empty() || recheck.scatters() => Standing::Undecided,
         Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
+        Standing::StillValid if recheck.is_unknown_here(tolerance_mm) => Standing::Undecided,
         other => other,
     }
 }
@@ -70,6 +71,7 @@ mod tests {
             tolerance_mm: 0.05,
             by_cameras: true,
             correction_mm: 0.0,
+            missed_mm: 0.0,
             extrapolated: Vec::new(),
         }
     }
@@ -81,6 +83,8 @@ mod tests {
         let standing = |recheck: &Recheck| standing(recheck, 0.05, false);
         assert_eq!(standing(&unchanged(0.012, 0.04)), Standing::StillValid);
         assert_eq!(standing(&unchanged(0.012, 1.2)), Standing::Undecided);
+        let missed = Recheck { missed_mm: 0.06, ..unchanged(0.012, 0.04) };
+        assert_eq!(standing(&missed), Standing::Undecided);
         let likeliest = vec![("scatter".to_owned(), "the readings scatter more".to_owned())];
         let scattered = Recheck { changed: true, likeliest, effect_mm: 0.14, ..unchanged(0.3, 0.4) };
         assert!(scattered.scatters() && standing(&scattered) == Standing::Undecided);

@@ -26,6 +26,16 @@ pub enum Error {
         /// The same of the robot's target.
         of_robot_mm: f64,
     },
+    /// A column of another kind was taken for that of the placements.
+    #[error(
+        "the {rows} rows are of {groups} groups, none of more than {most}: a group is one placement of the sensor, which takes the numbers of two points by itself"
+    )]
+    SmallGroups {
+        rows: usize,
+        groups: usize,
+        /// Rows of the largest.
+        most: usize,
+    },
     /// Robot and measurements are not about the same machine.
     #[error("the robot has {robot} joints, the measurements have {measurements}{}", missing.as_ref().map_or_else(String::new, |column| format!("; there is no column `{column}`")))]
     JointCount {
@@ -179,6 +189,11 @@ impl Explain for Error {
             Error::OnePoint { .. } => {
                 Some("`--columns` names the columns that hold the points, where they are others".to_owned())
             }
+            Error::SmallGroups { .. } => Some(
+                "give all rows that were measured from one placement the same `group`, or leave the column away where there is but one: under another name it is \
+                 not read"
+                    .to_owned(),
+            ),
             Error::NotKnown { .. } => {
                 Some("`identify` writes identification.json beside identified.toml: keep both together".to_owned())
             }

@@ -72,6 +72,9 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
         Standing::Undecided if !recheck.extrapolated.is_empty() => {
             "check with poses inside these ranges, or identify anew with poses of both"
         }
+        Standing::Undecided if recheck.is_unknown_here(judged.tolerance_mm) => {
+            "identify anew with these poses beside the old ones: over them the robot is not known as well as was stated"
+        }
         Standing::Undecided if recheck.scatters() => {
             "measure a pose twice: readings that differ are the instrument's, joint angles want their decimals, and what only differs after other motions is play; mend it, and check again"
         }

@@ -19,6 +19,7 @@ use crate::imaging::input::pairs::{PairFiles, Pairing, Source};
 use crate::imaging::{Board, Corners, Wanted, find_corners};
 use crate::stereo::findings::standing::MATERIAL_SHARE;
 use crate::stereo::pairs::open_numbers;
+use crate::stereo::recheck::again::{self, Ends};
 use crate::stereo::recheck::{self, Before, FEWEST_PAIRS};
 use crate::{progress, ranges, report};
 
@@ -44,15 +45,21 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     let mut checks = formats::history(&out, HISTORY)?;
 
     let (corners, own) = corners(args, &calibrated, config, (&out, &file))?;
-    let corners = open_numbers::by_rig(corners, &calibrated.rig);
+    let mut corners = open_numbers::by_rig(corners, &calibrated.rig);
+    let again = Again::among(&mut corners, &calibrated.ends_px, &own);
     corners.notes.iter().for_each(progress::note);
     let made_by = out.provenance();
     let whole = made_by.as_ref().and_then(|run| run.shares(&file)).filter(|_| !own.only_new);
     let said =
         |same| format!("{same} holds what this calibration was made of: only new pairs tell whether it still holds");
     let of_own = own.statements().into_iter().chain(whole.map(said));
-    let warnings: Vec<String> =
-        calibrated.doubts().into_iter().chain(other_size(&calibrated, &corners)).chain(of_own).collect();
+    let warnings: Vec<String> = calibrated
+        .doubts()
+        .into_iter()
+        .chain(other_size(&calibrated, &corners))
+        .chain(of_own)
+        .chain(again.said)
+        .collect();
     warnings.iter().for_each(progress::warn);
     let Calibrated { rig, noise, pair_excess, farthest_pair, pairs, volume, board, .. } = calibrated;
     let before = Before { rig, noise, pair_excess: pair_excess.unwrap_or(1.0), farthest_pair, pairs, volume };
@@ -67,7 +74,7 @@ pub fn run(args: &CameraCheck, against: &Utf8Path, config: &Config, run: Run) ->
     found.strays.retain(|stray| stray.effect_mm > MATERIAL_SHARE * tolerance_mm && !is_own(stray));
 
     let standing = Standing::of(found.change.is_some(), found.effect_mm, found.seen_mm, tolerance_mm)
-        .by(whole.is_some())
+        .by(whole.is_some() || again.only)
         .beside(!found.strays.is_empty());
     let content = formats::content(&found, standing, &file, tolerance_mm);
     let date = out.provenance().map(|provenance| provenance.date).unwrap_or_default();
@@ -109,6 +116,36 @@ fn check_squares(before: &Before, corners: &Corners, calibrated: Option<Board>) 
         board.square_mm, said.square_mm
     );
     Err(config::Error::Usage { message, hint: "leave `--square-mm` away".to_owned() }.into())
+}
+
+/// Pairs that show the board where the calibration's did, in pictures that are not its own: those were saved anew.
+struct Again {
+    /// What is said of them.
+    said: Option<String>,
+    /// Whether they are all that there is to judge by.
+    only: bool,
+}
+
+impl Again {
+    /// Takes them out where the others are enough.
+    fn among(corners: &mut Corners, known: &[Ends], own: &Own) -> Again {
+        let again = again::pairs(corners, known).into_iter().filter(|pair| !own.pairs.contains(pair));
+        let again: Vec<String> = again.collect();
+        let of = corners.pairs.len();
+        let only = !again.is_empty() && of < again.len() + FEWEST_PAIRS;
+        let said = (!again.is_empty()).then(|| {
+            let out = if only { "which say nothing of what happened since" } else { "left out" };
+            format!(
+                "{} of {of} pairs show the board where pairs of the calibration did, to a tenth of a pixel: their pictures, saved anew, {out}: {}",
+                again.len(),
+                named(&again)
+            )
+        });
+        if !only {
+            corners.pairs.retain(|pair| !again.contains(&pair.pair));
+        }
+        Again { said, only }
+    }
 }
 
 /// Pairs of pictures that the calibration was made of, among those that are to say whether it still holds.

@@ -21,8 +21,10 @@ const SAME_POINT_MM: f64 = 1e-9;
 /// taken for mm.
 const LEAST_WAY: f64 = 2e-4;
 
-/// Refuses points of which all are one although the robot moved: nothing was measured, or something that stands still.
+/// Refuses points of groups too small to be placements, and those of which all are one although the robot moved: nothing
+/// was measured, or something that stands still.
 pub fn check_points(set: &Dataset, robot: Option<&Robot>) -> Result<(), Error> {
+    check_groups(set)?;
     let points: Vec<Point3<f64>> = set.poses.iter().filter_map(|pose| pose.reading.point_mm()).collect();
     let moved = set.poses.iter().any(|pose| pose.joints_rad != set.poses[0].joints_rad);
     if points.len() < 2 || !moved {
@@ -33,6 +35,22 @@ pub fn check_points(set: &Dataset, robot: Option<&Robot>) -> Result<(), Error> {
     match way_mm <= SAME_POINT_MM.max(LEAST_WAY * of_robot_mm) {
         true => Err(Error::OnePoint { rows: points.len(), point_mm: points[0].coords.into(), way_mm, of_robot_mm }),
         false => Ok(()),
+    }
+}
+
+/// Refuses points of which each, or each two, are a placement of their own.
+fn check_groups(set: &Dataset) -> Result<(), Error> {
+    /// Points of a placement that place it; a pose does by itself.
+    const PLACE: usize = 3;
+    let is_read = |pose: &Pose| pose.reading.point_mm().is_some();
+    let rows = set.poses.iter().filter(|pose| is_read(pose)).count();
+    let groups = set.groups.len();
+    let of_group = |group: usize| set.poses.iter().filter(|pose| pose.group == group && is_read(pose)).count();
+    let most = (0..groups).map(of_group).max().unwrap_or(0);
+    if groups > 1 && rows >= PLACE && most < PLACE && !set.has_rotations() {
+        Err(Error::SmallGroups { rows, groups, most })
+    } else {
+        Ok(())
     }
 }
 
@@ -61,6 +79,35 @@ pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
     let key = |i: usize| (set.poses[i].group, &set.poses[i].joints_rad);
     rows.sort_by(|&a, &b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal).then(a.cmp(&b)));
     rows
+}
+
+/// The rows of each pose: those of a group whose joints are all but the same, read anew or come back to. What a fit
+/// leaves of one of them it leaves of the others as well.
+pub fn by_pose(set: &Dataset, rows: Vec<usize>) -> Vec<Vec<usize>> {
+    /// Of how much the joints' readings spread over the rows, root of the mean square over the joints: the nearest of
+    /// thousands of poses that are drawn at random lie farther apart.
+    const ALIKE: f64 = 0.1;
+    let joint = |row: usize, joint: usize| set.poses[row].joints_rad[joint];
+    let count = rows.len().max(1) as f64;
+    let variance = |k: usize| {
+        let mean = rows.iter().map(|&row| joint(row, k)).sum::<f64>() / count;
+        rows.iter().map(|&row| (joint(row, k) - mean).powi(2)).sum::<f64>() / count
+    };
+    let variances: Vec<f64> = (0..set.joint_count()).map(variance).collect();
+    let moving: Vec<usize> = (0..variances.len()).filter(|&k| variances[k] > 0.0).collect();
+    let most = ALIKE * ALIKE * moving.len() as f64;
+    let is_near = |a: usize, b: usize| {
+        let square = |&k: &usize| (joint(a, k) - joint(b, k)).powi(2) / variances[k];
+        set.poses[a].group == set.poses[b].group && moving.iter().map(square).sum::<f64>() <= most
+    };
+    let mut poses: Vec<Vec<usize>> = Vec::new();
+    for row in by_joints(set, rows.clone()) {
+        match poses.iter_mut().find(|pose| pose.iter().all(|&other| is_near(row, other))) {
+            Some(pose) => pose.push(row),
+            None => poses.push(vec![row]),
+        }
+    }
+    poses
 }
 
 /// Way of a joint, rad or mm, below which it stands still but for what its encoder reads.

@@ -1,7 +1,7 @@
 //! Which rows are held out together: every pose once in each repeat, in five parts of all placements alike.
 //!
-//! In: rows. Out: for each repeat the fold of each row. Rows with the same joints are in one fold, or one would tell of
-//! the other; centres, which their group's distances are measured from, are in none. The draws are the same in every
+//! In: rows. Out: for each repeat the fold of each row. Rows of one pose are in one fold, or one would tell of the
+//! other; centres, which their group's distances are measured from, are in none. The draws are the same in every
 //! run: no seed of the user's changes them.
 
 use nalgebra::Vector3;
@@ -10,7 +10,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::errors::{Judge, RowError};
 use crate::identify::data::dataset::Dataset;
-use crate::identify::data::still::by_joints;
+use crate::identify::data::still::by_pose;
 use crate::measurements::Role;
 use crate::robot::Robot;
 
@@ -23,9 +23,8 @@ pub const REPEATS: usize = 4;
 /// The fold of each row of the data set, a list a repeat; `None` for rows that are not among these, and for centres.
 pub fn folds(set: &Dataset, rows: &[usize]) -> Vec<Vec<Option<usize>>> {
     let kept = rows.iter().copied().filter(|&r| set.poses[r].role != Role::Center);
-    let order = by_joints(set, kept.collect());
-    let key = |r: usize| (set.poses[r].group, &set.poses[r].joints_rad);
-    let poses: Vec<&[usize]> = order.chunk_by(|&a, &b| key(a) == key(b)).collect();
+    let mut poses = by_pose(set, kept.collect());
+    poses.sort_by_key(|pose| set.poses[pose[0]].group);
     (1..=REPEATS as u64)
         .map(|repeat| {
             let mut random = Pcg64Mcg::seed_from_u64(repeat);
@@ -33,7 +32,7 @@ pub fn folds(set: &Dataset, rows: &[usize]) -> Vec<Vec<Option<usize>>> {
             let mut next = 0;
             for of_group in poses.chunk_by(|a, b| set.poses[a[0]].group == set.poses[b[0]].group) {
                 // Fisher and Yates' shuffle.
-                let mut shuffled: Vec<&[usize]> = of_group.to_vec();
+                let mut shuffled: Vec<&Vec<usize>> = of_group.iter().collect();
                 for i in (1..shuffled.len()).rev() {
                     shuffled.swap(i, random.random_range(0..=i));
                 }

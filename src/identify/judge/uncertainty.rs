@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
 use crate::identify::data::dataset::{Dataset, Pose};
+use crate::identify::data::still::by_pose;
 use crate::identify::judge::lengths::{Length, Lengths, MEAN_OVER_RMS};
 use crate::identify::model::kinematics::Kinematics;
 use crate::identify::settings::Model;
@@ -168,34 +169,54 @@ pub fn stated_mm(set: &Dataset) -> Option<f64> {
 /// Share of a row's own reading in what is predicted there, of which on more is not told from all of it.
 const ALL: f64 = 0.99;
 
-/// Times that the variance of the point predicted at each row of the data set is larger without that row's reading; one
-/// at rows that were not fitted. A fit follows the rows that it has, and the fewer they are, the less what is uncertain
-/// there says of poses between them. Of white readings with the variance H predicted by the fit the one without a row
-/// is `H (I - H)^-1` (Cook and Weisberg, "Residuals and Influence in Regression", 1982). The sensor's own errors are
-/// taken as found: they are of all rows.
+/// Times that the variance of the point predicted at each row of the data set is larger without the readings of that
+/// row's pose; one at rows that were not fitted. A fit follows the poses that it has, and the fewer they are, the less
+/// what is uncertain there says of others between them. Of white readings with the variance H predicted by the fit the
+/// one without some of them is `H (I - H)^-1` (Cook and Weisberg, "Residuals and Influence in Regression", 1982). The
+/// sensor's own errors are taken as found: they are of all rows.
 fn times_without(formulation: &Formulation, set: &Dataset) -> Vec<f64> {
     let mut times = vec![1.0; set.poses.len()];
     if !matches!(formulation.model, Model::Position | Model::Pose) {
         return times;
     }
-    for (_, of_rows) in each_row(formulation) {
-        for (row, _, predicted) in of_rows {
-            let shares = predicted.symmetric_eigenvalues().map(|share| share.clamp(0.0, ALL));
-            let without = shares.map(|share| share / (1.0 - share)).sum();
-            if shares.sum() > 0.0 {
-                times[row] = without / shares.sum();
+    for Predicted { roots, rows, .. } in each_placement(formulation) {
+        let mut at: Vec<Vec<usize>> = vec![Vec::new(); set.poses.len()];
+        rows.iter().for_each(|(row, of_row)| at[*row].extend(of_row.clone()));
+        for pose in by_pose(set, rows.iter().map(|(row, _)| *row).collect()) {
+            let of_pose: Vec<usize> = pose.iter().flat_map(|&row| at[row].iter().copied()).collect();
+            let svd = roots.select_rows(&of_pose).svd(true, false);
+            let Some(u) = &svd.u else { continue };
+            // So many readings are as sure of a pose as one that is so much better.
+            let all = 1.0 - (1.0 - ALL) / pose.len() as f64;
+            let shares = svd.singular_values.map(|root| (root * root).min(all));
+            let sum = |of_row: Range<usize>, of_share: &dyn Fn(f64) -> f64| -> f64 {
+                of_row.map(|i| (0..shares.len()).map(|k| u[(i, k)].powi(2) * of_share(shares[k])).sum::<f64>()).sum()
+            };
+            let mut start = 0;
+            for &row in &pose {
+                let of_row = start..start + at[row].len();
+                start = of_row.end;
+                let with = sum(of_row.clone(), &|share| share);
+                if with > 0.0 {
+                    times[row] = sum(of_row, &|share| share / (1.0 - share)) / with;
+                }
             }
         }
     }
     times
 }
 
-/// Of each row of a placement: its row of the data set, where its white residuals stand, and the variance that the fit
-/// predicts them to.
-type Predicted = Vec<(usize, Range<usize>, DMatrix<f64>)>;
+/// What a fit predicts of a placement.
+pub(super) struct Predicted {
+    pub placement: Placement,
+    /// Of the placement's white residuals: a root times its transpose is the covariance of what the fit predicts.
+    pub roots: DMatrix<f64>,
+    /// The placement's rows of the data set, and where the residuals of each stand.
+    pub rows: Vec<(usize, Range<usize>)>,
+}
 
-/// The placements of a fit with the sensor's own errors as found, and what it predicts of each row.
-pub(super) fn each_row(formulation: &Formulation) -> Vec<(Placement, Predicted)> {
+/// The placements of a fit with the sensor's own errors as found.
+pub(super) fn each_placement(formulation: &Formulation) -> Vec<Predicted> {
     let offsets = formulation.offsets_of();
     let count = formulation.parameters().len();
     let rows = formulation.rows.with_sensor_fixed(&offsets);
@@ -203,20 +224,24 @@ pub(super) fn each_row(formulation: &Formulation) -> Vec<(Placement, Predicted)>
     let sds = formulation.most.standard_deviations(formulation.parameters(), &[]);
     let sds = DMatrix::from_diagonal(&DVector::from_vec(sds));
     let before = DMatrix::identity(count, count) * if formulation.held { 1.0 } else { 0.0 };
-    let covariance = &sds * pseudo_inverse(before + &sds * product(&jacobian, &jacobian) * &sds) * &sds;
+    let covariance = &sds * root(pseudo_inverse(before + &sds * product(&jacobian, &jacobian) * &sds));
     let of_placement = |placement: Placement| {
         let Eliminated { follow, inverse, .. } = placement.eliminated();
-        let columns = &placement.linear.jacobian - &placement.linear.design * follow;
-        let of_pose = |(place, at): (usize, Range<usize>)| {
-            let of_row = |all: &DMatrix<f64>| all.rows(at.start, at.len()).into_owned();
-            let (columns, own) = (of_row(&columns), of_row(&placement.linear.design));
-            let predicted = &columns * &covariance * columns.transpose() + &own * &inverse * own.transpose();
-            (rows.rows[place], at, predicted)
-        };
-        let predicted = placement.by_pose().map(of_pose).collect();
-        (placement, predicted)
+        let columns = (&placement.linear.jacobian - &placement.linear.design * follow) * &covariance;
+        let own = &placement.linear.design * root(inverse);
+        let (shared, all) = (columns.ncols(), columns.ncols() + own.ncols());
+        let mut roots = columns.resize_horizontally(all, 0.0);
+        roots.columns_mut(shared, all - shared).copy_from(&own);
+        let rows = placement.by_pose().map(|(place, at)| (rows.rows[place], at)).collect();
+        Predicted { placement, roots, rows }
     };
     Linearised::new(&rows, &offsets[..count]).placements.into_iter().map(of_placement).collect()
+}
+
+/// A root of a covariance: times its transpose it is that.
+fn root(covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = covariance.symmetric_eigen();
+    &eigen.eigenvectors * DMatrix::from_diagonal(&eigen.eigenvalues.map(|value| value.max(0.0).sqrt()))
 }
 
 /// From where to where each joint was read in these rows, deg (mm where it slides).

@@ -184,12 +184,19 @@ impl Record {
         let (chosen, expected_mm) = (self.chosen_method()?, self.expected.as_ref()?.mean_mm);
         let mean = |figures: &PointSpread| figures.point.as_ref().and_then(|spread| spread.mean_abs_mm);
         let held_out_mm = mean(chosen.quality.judged());
-        let few = "there are too few rows for so many unknowns; measure more, that bend every joint";
+        let (rows, poses) = (set.fit_rows().len(), still::by_pose(set, set.fit_rows()).len());
+        let few = if poses < rows {
+            format!(
+                "the {rows} rows are of {poses} poses only, too few for so many unknowns; measure others, that bend every joint"
+            )
+        } else {
+            "there are too few rows for so many unknowns; measure more, that bend every joint".to_owned()
+        };
         if let Some(off) = held_out_mm.filter(|off| *off > SEVERAL * expected_mm) {
             // Where rows are no fewer than half as many more as are needed, what is expected holds what they leave
             // open.
             let unknowns = chosen.parameters.len() + 6 * set.groups.len();
-            let why = if self.folded || 3 * set.fit_rows().len() < 2 * unknowns { few } else { ANOTHER_STATE };
+            let why = if self.folded || 3 * rows < 2 * unknowns { few.as_str() } else { ANOTHER_STATE };
             return Some(format!(
                 "rows that the fit did not have are off by {off:.3} mm, expected are {expected_mm:.3} mm: {why}"
             ));

@@ -9,6 +9,7 @@
 //! nineteen of twenty such tests from the level plus 1.645 of its standard deviations on, which is what the pairs are
 //! said to see. Goes wrong: pairs that are all alike hardly see a focus; that is what the stated figures say.
 
+pub mod again;
 mod looks;
 mod strays;
 #[cfg(test)]

@@ -258,3 +258,35 @@ fn try_step(layout: &Layout, values: &Values, equations: &Equations, damping: f6
     }
     Some((Values { shared: layout.step(&values.shared, step.as_slice()), poses }, predicted_gain))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::geometry::transform;
+    use crate::stereo::data::Noise;
+    use crate::stereo::model::Shared;
+    use crate::stereo::model::board_shape::FLAT;
+    use crate::stereo::synthetic::World;
+
+    /// Boards that hardly tilt and begin tilted the other way: a step of each pose leads far from where it ends.
+    #[test]
+    fn a_pose_that_is_searched_ends_where_a_step_does_not() {
+        let world = World::facing(6, |i| Vector3::new(0.02 * i, 0.03, 0.0));
+        let corners = world.corners(1);
+        let mut views: Vec<View> = corners.pairs.iter().map(|pair| View::new(&world.board, pair, 0)).collect();
+        Noise { factor: 1.0, added_px: 0.0, reduced_chi_square: None }.apply(&mut views);
+        let (layout, priors) = (Layout::POSES_ONLY, Priors::NONE);
+        let robust = Robust { views: &views, layout: &layout, priors: &priors, loss: Loss::Student(4.0) };
+        let at = |poses: Vec<Transform>| Values { shared: Shared { rig: world.rig.clone(), shape_mm: FLAT }, poses };
+        let other_way = transform(Vector3::new(-0.5, -0.3, 0.0), Vector3::zeros());
+        let start = at(world.poses.iter().map(|pose| pose * other_way).collect());
+        let there = robust.equations(&start).unwrap();
+        let cost = |values: &Values| robust.equations(values).unwrap().cost();
+        let truth = cost(&at(world.poses.clone()));
+        let searched = cost(&robust.with_poses_searched(&start));
+        let step = cost(&with_poses_following(&start, &there).unwrap());
+        assert!(searched < truth && step > 2.0 * truth, "{searched} and {step} where the truth is {truth}");
+    }
+}

@@ -21,6 +21,7 @@ use crate::identify::solve::linearised::Linearised;
 use crate::identify::solve::task::Task;
 use crate::linear_algebra::{product, pseudo_inverse};
 use crate::robot::{Parameter, Robot};
+use crate::statistics::median;
 
 /// How far a placement is from where it stood: turn, rad, and shift, mm.
 pub(super) fn off(frame: &Transform, old: &Uncertain) -> Vector6<f64> {
@@ -131,9 +132,22 @@ impl Compared<'_> {
 
     /// The largest residual of a point at the old robot, mm.
     pub(super) fn misfit_mm(&self) -> f64 {
+        self.misfits_mm().into_iter().fold(0.0, f64::max)
+    }
+
+    /// By how much half of the points and more miss the old robot beyond what their readings are off by, mm.
+    pub(super) fn missed_mm(&self, stated_mm: f64) -> f64 {
+        /// Median of the squared length of a point's error over the variance of a coordinate.
+        const MEDIAN_CHI_SQUARE_3: f64 = 2.366;
+        let missed_mm = median(self.misfits_mm()).unwrap_or(0.0);
+        (missed_mm.powi(2) - MEDIAN_CHI_SQUARE_3 * stated_mm.powi(2)).max(0.0).sqrt()
+    }
+
+    fn misfits_mm(&self) -> Vec<f64> {
         let raw = self.rows.raw(&self.offsets(&vec![0.0; self.count]));
-        let of_point = |raw: &Raw| if let Raw::Point(off, _) = raw { off.norm() } else { 0.0 };
-        raw.iter().map(|(_, _, raw)| of_point(raw)).fold(0.0, f64::max)
+        raw.iter()
+            .filter_map(|(_, _, raw)| if let Raw::Point(off, _) = raw { Some(off.norm()) } else { None })
+            .collect()
     }
 }
 

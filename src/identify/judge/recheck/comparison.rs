@@ -8,6 +8,7 @@ use super::suspects::{Suspect, suspects};
 use crate::difference::Difference;
 use crate::identify::Error;
 use crate::identify::data::dataset::Dataset;
+use crate::identify::judge::uncertainty::stated_mm;
 use crate::identify::residuals::eliminate::Block;
 use crate::robot::{Parameter, Robot};
 
@@ -103,6 +104,7 @@ impl Comparison<'_> {
             tolerance_mm: self.before.p95_mm,
             by_cameras,
             correction_mm,
+            missed_mm: compared.missed_mm(stated_mm(self.set).unwrap_or(0.0)),
             extrapolated,
         };
         Some(Said { recheck, difference: looks.look.difference, likelihood })

@@ -107,6 +107,8 @@ pub struct Recheck {
     /// How far what was corrected of the links moves the target at these poses, mm: where they stand outside of what
     /// was identified, as much may be off.
     pub correction_mm: f64,
+    /// By how much half of the points and more miss the robot, beyond what their readings are off by, mm.
+    pub missed_mm: f64,
     /// The joints whose ranges many rows are outside of, where a change is no more than that.
     pub extrapolated: Vec<String>,
 }
@@ -157,6 +159,11 @@ impl Recheck {
     /// Whether the readings scatter more than they did, and that is all that they show.
     pub fn scatters(&self) -> bool {
         self.likeliest.iter().any(|(word, _)| word == SCATTER)
+    }
+
+    /// Whether no change is seen only because the robot was not known as well as it is held to be.
+    pub fn is_unknown_here(&self, tolerance_mm: f64) -> bool {
+        self.is_open() && self.missed_mm > tolerance_mm
     }
 
     /// Whether no change is told: figures are then those of what one may be.
@@ -217,6 +224,10 @@ impl Recheck {
                 }
             }
             (false, _) if !moved.is_empty() => self.of_moved(&moved.join(", ")),
+            (false, _) if self.is_unknown_here(self.tolerance_mm) => format!(
+                "no change beyond chance, but half of the poses miss the robot by {:.4} mm and more: it is not known so well there",
+                self.missed_mm
+            ),
             (false, _) => "no change beyond chance".to_owned(),
         }
     }
@@ -229,7 +240,7 @@ impl Recheck {
     /// Whether the poses rule out that the robot changed: in place of the sensor that moved, and beside it by as much
     /// as matters.
     pub fn is_same(&self) -> bool {
-        !self.changed && self.instead.is_empty() && self.room_mm() <= self.tolerance_mm
+        !self.changed && self.instead.is_empty() && self.room_mm().max(self.missed_mm) <= self.tolerance_mm
     }
 
     /// Of placements that moved, or seem to.

@@ -39,6 +39,10 @@ pub(super) fn larger(comparison: &Comparison, used: &[usize], whole: &Said) -> O
     let before = Before { trust, freedom, ..before.clone() };
     let parameters = comparison.parameters.clone();
     let said = Comparison { set, robot, before: &before, stood, parameters, oriented }.said(used).ok()?.recheck;
+    // An instrument that was placed several times does not stand elsewhere each time: the robot does.
+    if said.placements.len() > 1 && said.placements.iter().all(|placement| placement.moved) {
+        return None;
+    }
     let words = format!(
         "the readings scatter more than at the identification ({now_mm:.4} mm a coordinate against {then_mm:.4}), and no zero of a joint, tool or scale \
          shows beyond that: a noisier instrument, rounded joint angles, or play"

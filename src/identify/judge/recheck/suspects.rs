@@ -9,7 +9,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::identify::judge::uncertainty::each_row;
+use crate::identify::judge::uncertainty::{Predicted, each_placement};
 use crate::identify::settings::Model;
 use crate::identify::solve::formulation::Formulation;
 use crate::linear_algebra::without;
@@ -77,7 +77,7 @@ pub fn variances_along(formulation: &Formulation) -> Vec<(String, f64)> {
         _ => 0.0,
     };
     let mut sums = vec![(0.0, 0.0); parameters.len() + 1];
-    for (placement, rows) in each_row(formulation) {
+    for Predicted { placement, roots, rows } in each_placement(formulation) {
         let count = parameters.len();
         let of_robot = placement.linear.jacobian.columns(0, count).into_owned();
         // A scale of the readings is one of all lengths.
@@ -87,7 +87,9 @@ pub fn variances_along(formulation: &Formulation) -> Vec<(String, f64)> {
             columns.set_column(count, &longer);
         });
         let columns = without(&columns, &placement.linear.design);
-        for (_, at, leverage) in rows {
+        for (_, at) in rows {
+            let own = roots.rows(at.start, at.len());
+            let leverage = own * own.transpose();
             let of_row = columns.rows(at.start, at.len());
             let pulls = of_row.tr_mul(&placement.linear.residuals.rows(at.start, at.len()));
             let left = DMatrix::identity(at.len(), at.len()) - leverage;

@@ -9,7 +9,7 @@ use crate::identify::judge::uncertainty::Expected;
 use crate::identify::run::identify;
 use crate::identify::settings::{Extensions, Settings};
 use crate::identify::synthetic;
-use crate::measurements::Measurement;
+use crate::measurements::{Measurement, Role};
 
 mod near;
 mod scatter;
@@ -101,10 +101,15 @@ fn robots_that_did_not_change_raise_an_alarm_as_often_as_stated() {
     assert!(alarms < 4, "{alarms} of 50");
 }
 
-/// Where the sensor of group 2 stands as the found robot has it, `shift_mm` further: its first link is the file's.
+/// Where the sensor of group 2 stands as the found robot has it, `shift_mm` further.
 fn stood(cell: &Cell, shift_mm: f64) -> Uncertain {
+    stood_in(cell, 2, shift_mm)
+}
+
+/// The same of another group: the found robot's first link is the file's.
+fn stood_in(cell: &Cell, group: usize, shift_mm: f64) -> Uncertain {
     let first = |robot: &Robot| robot.joints[0].previous_from_this(0.0);
-    let mut transform = synthetic::sensor(2) * first(&cell.truth) * first(&cell.found).inverse();
+    let mut transform = synthetic::sensor(group) * first(&cell.truth) * first(&cell.found).inverse();
     transform.translation.vector.x += shift_mm;
     Uncertain { transform, covariance: Matrix6::from_diagonal_element(1e-9) }
 }

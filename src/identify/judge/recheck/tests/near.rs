@@ -53,6 +53,24 @@ fn poses_near_to_each_other_call_no_robot_the_same() {
     assert!(seen >= 1, "{seen} of 12");
 }
 
+/// A robot that was hardly known: what misses it by more than is promised is no change, and no proof that it is good.
+#[test]
+fn poses_that_miss_what_was_promised_call_no_robot_valid() {
+    let cell = cell(false, 4);
+    let set = Dataset::new(&cell.rows(&|_| {}, 20, 61)).unwrap();
+    let is_unknown = |before: &Before, robot: &Robot| {
+        let found = recheck(&set, robot, before, &|_| None).unwrap();
+        assert_eq!(found.cause(), "", "{}", found.statement());
+        found.is_unknown_here(before.p95_mm)
+    };
+    assert!(!is_unknown(&cell.before, &cell.found));
+    let unsure = Before { covariance: 1e6 * &cell.before.covariance, ..cell.before.clone() };
+    assert!(!is_unknown(&unsure, &cell.found));
+    let mut robot = cell.found.clone();
+    robot.add(Parameter::Theta(3), 20.0);
+    assert!(is_unknown(&unsure, &robot));
+}
+
 #[test]
 fn poses_that_see_every_joint_tell_a_moved_sensor_from_a_changed_robot() {
     for seed in [4, 5] {

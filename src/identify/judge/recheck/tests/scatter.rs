@@ -43,3 +43,20 @@ fn joints_that_changed_are_no_scatter() {
         }
     }
 }
+
+/// Links that changed, seen from several placements: not all of them stand elsewhere, and no noise moves them.
+#[test]
+fn links_that_changed_are_no_noise_where_all_placements_seem_to_move() {
+    for (seed, by_mm) in [(4, 0.5), (5, 1.0), (6, 2.0)] {
+        let cell = cell(false, seed);
+        let become_ = |robot: &mut Robot| {
+            *robot = cell.truth.clone();
+            robot.add(Parameter::A(3), by_mm);
+        };
+        let mut world = synthetic::planned(48, 0, 25.0, NOISE_MM, 70 + seed, &become_);
+        world.rows.retain(|row| row.at.role != Role::Center);
+        let placed = |group: &str| Some(stood_in(&cell, group[1..].parse().ok()?, 0.0));
+        let found = recheck(&Dataset::new(&world.rows).unwrap(), &cell.found, &cell.before, &placed).unwrap();
+        assert!(found.changed && !found.scatters(), "{by_mm} mm: {}", found.statement());
+    }
+}
