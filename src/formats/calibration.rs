@@ -55,7 +55,7 @@ pub struct CalibrationFile {
     /// How far black has spread on it, where that moves its corners.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     board_spread: Option<SpreadRecord>,
-    /// Where each pair that was used had the first and the last corner of its left picture.
+    /// Where each pair that was used had the first and the last corner of its pictures.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     ends_px: Vec<Ends>,
     /// Whether the last pairs confirmed the rig; empty where they did.
@@ -101,7 +101,7 @@ pub struct Calibrated {
     pub volume: Option<Volume>,
     pub check: Option<Check>,
     pub board: Option<Board>,
-    /// Where each pair that was used had the first and the last corner of its left picture.
+    /// Where each pair that was used had the first and the last corner of its pictures.
     pub ends_px: Vec<Ends>,
     /// The calibration's last pairs, where they contradict the rig.
     pub unconfirmed: Vec<String>,
@@ -247,7 +247,7 @@ impl CalibrationFile {
             length_mm: Some(facts.volume.length_mm),
         });
         self.volume = Some(facts.volume.volume.clone());
-        self.ends_px = calibration.views.iter().filter_map(again::of_view).collect();
+        self.ends_px = calibration.views.iter().map(again::of_view).collect();
         self.unconfirmed = calibration.standing.unconfirmed.clone();
         self.changes_since = calibration.since_moment.iter().map(|step| step.as_slice().to_vec()).collect();
         self.corner_noise = Some(NoiseRecord {
