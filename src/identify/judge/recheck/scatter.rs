@@ -3,7 +3,8 @@
 //! In: rows that contradict the old robot, and that nothing single explains. Out: what they say where all of it may be
 //! scatter, which then is their cause. Method: what no zero of a joint, no tool and no scale together explain tells the
 //! scatter; where neither all of these together nor any of them shows beyond it (F tests), nothing but scatter is told.
-//! All figures are then those of the larger scatter. Goes wrong: what follows the pose in another way than those (a
+//! All figures are then those of the larger scatter. Where all of several placements seem to stand elsewhere beside it,
+//! it is no scatter: the target is off by what they seem to have moved. Goes wrong: what follows the pose in another way than those (a
 //! load, play) is scatter too, unless it looks like one of them.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -41,7 +42,9 @@ pub(super) fn larger(comparison: &Comparison, used: &[usize], whole: &Said) -> O
     let said = Comparison { set, robot, before: &before, stood, parameters, oriented }.said(used).ok()?.recheck;
     // An instrument that was placed several times does not stand elsewhere each time: the robot does.
     if said.placements.len() > 1 && said.placements.iter().all(|placement| placement.moved) {
-        return None;
+        let shifts_mm = said.placements.iter().map(|placement| placement.shift_mm);
+        let effect_mm = shifts_mm.fold(whole.recheck.effect_mm, f64::max);
+        return Some(Recheck { effect_mm, ..whole.recheck.clone() });
     }
     let words = format!(
         "the readings scatter more than at the identification ({now_mm:.4} mm a coordinate against {then_mm:.4}), and no zero of a joint, tool or scale \

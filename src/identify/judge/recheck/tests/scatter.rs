@@ -58,5 +58,7 @@ fn links_that_changed_are_no_noise_where_all_placements_seem_to_move() {
         let placed = |group: &str| Some(stood_in(&cell, group[1..].parse().ok()?, 0.0));
         let found = recheck(&Dataset::new(&world.rows).unwrap(), &cell.found, &cell.before, &placed).unwrap();
         assert!(found.changed && !found.scatters(), "{by_mm} mm: {}", found.statement());
+        let is_told = found.cause() != "unknown" || found.effect_mm > 0.5 * by_mm;
+        assert!(is_told, "{by_mm} mm: {} mm, {}", found.effect_mm, found.statement());
     }
 }
