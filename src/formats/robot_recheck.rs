@@ -17,7 +17,7 @@ pub fn standing(recheck: &Recheck, tolerance_mm: f64, own_data: bool) -> Standin
         _ if own_data => Standing::OwnData,
         _ if !recheck.extrapolated.is_empty() || recheck.scatters() => Standing::Undecided,
         Standing::StillValid if !recheck.strays.is_empty() => Standing::Undecided,
-        Standing::StillValid if recheck.is_unknown_here(tolerance_mm) => Standing::Undecided,
+        Standing::StillValid if recheck.is_unknown_here() => Standing::Undecided,
         other => other,
     }
 }

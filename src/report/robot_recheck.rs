@@ -35,6 +35,7 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
     let mended = if judged.is_mended { "with the rows mended: " } else { "" };
     let statement = format!("{mended}{far_within}{}", recheck.statement());
     let of_rest = match recheck.is_open() {
+        _ if recheck.is_unknown_here() => format!("{statement}, tolerance {tolerance} mm"),
         true => format!(
             "{statement}; these {} poses leave room for a single cause that moves the target by up to {} mm at them and {} mm elsewhere where the robot \
              was identified (95 %), tolerance {tolerance} mm, and see each one that moves it by {} mm at them in 19 of 20 such checks{}",
@@ -72,7 +73,7 @@ fn next(judged: Judged, recheck: &Recheck) -> &'static str {
         Standing::Undecided if !recheck.extrapolated.is_empty() => {
             "check with poses inside these ranges, or identify anew with poses of both"
         }
-        Standing::Undecided if recheck.is_unknown_here(judged.tolerance_mm) => {
+        Standing::Undecided if recheck.is_unknown_here() => {
             "identify anew with these poses beside the old ones: over them the robot is not known as well as was stated"
         }
         Standing::Undecided if recheck.scatters() => {
@@ -177,6 +178,7 @@ pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -
 pub fn page(recheck: &Recheck, judged: Judged, checks: &[Check], warnings: &[String]) -> Result<String> {
     let Judged { standing, tolerance_mm, .. } = judged;
     let of_target = match recheck.is_open() {
+        _ if recheck.is_unknown_here() => (recheck.missed_mm, "half of the poses miss the robot by this and more"),
         true => (recheck.room_mm(), "movement of the target that is not ruled out"),
         false => (recheck.effect_mm, "movement of the target beyond chance"),
     };

@@ -84,8 +84,8 @@ pub fn by_joints(set: &Dataset, mut rows: Vec<usize>) -> Vec<usize> {
 /// The rows of each pose: those of a group whose joints are all but the same, read anew or come back to. What a fit
 /// leaves of one of them it leaves of the others as well.
 pub fn by_pose(set: &Dataset, rows: Vec<usize>) -> Vec<Vec<usize>> {
-    /// Of how much the joints' readings spread over the rows, root of the mean square over the joints: the nearest of
-    /// thousands of poses that are drawn at random lie farther apart.
+    /// Of how much the joints' readings spread over the rows, root of the mean square over six joints: of a thousand
+    /// poses that are drawn at random hardly two lie so near.
     const ALIKE: f64 = 0.1;
     let joint = |row: usize, joint: usize| set.poses[row].joints_rad[joint];
     let count = rows.len().max(1) as f64;

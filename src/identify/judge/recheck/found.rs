@@ -162,8 +162,8 @@ impl Recheck {
     }
 
     /// Whether no change is seen only because the robot was not known as well as it is held to be.
-    pub fn is_unknown_here(&self, tolerance_mm: f64) -> bool {
-        self.is_open() && self.missed_mm > tolerance_mm
+    pub fn is_unknown_here(&self) -> bool {
+        self.is_open() && self.missed_mm > self.tolerance_mm
     }
 
     /// Whether no change is told: figures are then those of what one may be.
@@ -224,7 +224,7 @@ impl Recheck {
                 }
             }
             (false, _) if !moved.is_empty() => self.of_moved(&moved.join(", ")),
-            (false, _) if self.is_unknown_here(self.tolerance_mm) => format!(
+            (false, _) if self.is_unknown_here() => format!(
                 "no change beyond chance, but half of the poses miss the robot by {:.4} mm and more: it is not known so well there",
                 self.missed_mm
             ),

@@ -4,8 +4,8 @@
 //! scatter, which then is their cause. Method: what no zero of a joint, no tool and no scale together explain tells the
 //! scatter; where neither all of these together nor any of them shows beyond it (F tests), nothing but scatter is told.
 //! All figures are then those of the larger scatter. Where all of several placements seem to stand elsewhere beside it,
-//! it is no scatter: the target is off by what they seem to have moved. Goes wrong: what follows the pose in another way than those (a
-//! load, play) is scatter too, unless it looks like one of them.
+//! it is no scatter: the target is off by what they seem to have moved. Goes wrong: what follows the pose in another way
+//! than those (a load, play) is scatter too, unless it looks like one of them.
 
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 

@@ -23,7 +23,10 @@ pub(super) fn findings(case: &Case) -> Evidence {
     let counts = |finding: &&Finding| !is_before(finding) || may_be_board(finding);
     let left: Vec<&Finding> = case.facts.findings.iter().filter(counts).collect();
     let of_board = left.iter().copied().find(may_be_board);
-    let value = left.iter().filter_map(|finding| finding.effect_mm).fold(0.0, f64::max);
+    // A step that is left behind is not in the uncertainty of the rig.
+    let if_of_board = of_board
+        .map(|step| step.effect_mm.unwrap_or(f64::INFINITY) + case.facts.accuracy.extremes.largest.at_most_mm());
+    let value = left.iter().filter_map(|finding| finding.effect_mm).chain(if_of_board).fold(0.0, f64::max);
     let detail = if left.is_empty() {
         "no change during the series: no step, drift or change of focus beyond their scatter".to_owned()
     } else {

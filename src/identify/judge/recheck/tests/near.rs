@@ -61,7 +61,7 @@ fn poses_that_miss_what_was_promised_call_no_robot_valid() {
     let is_unknown = |before: &Before, robot: &Robot| {
         let found = recheck(&set, robot, before, &|_| None).unwrap();
         assert_eq!(found.cause(), "", "{}", found.statement());
-        found.is_unknown_here(before.p95_mm)
+        found.is_unknown_here()
     };
     assert!(!is_unknown(&cell.before, &cell.found));
     let unsure = Before { covariance: 1e6 * &cell.before.covariance, ..cell.before.clone() };
