@@ -51,10 +51,12 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         pairing.pairs.par_iter().map(|files| [&files.left, &files.right].map(|path| image::header(path))).collect();
     of_pages(&pairing.pairs, &headers).iter().for_each(progress::note);
     let sizes = majority_sizes(&headers);
-    let bar = progress::bar("looking for the board", 2 * pairing.pairs.len() as u64);
     let folder = Folder { files: &pairing.pairs, headers: &headers, sizes };
-    let look_at = |indices: &[usize]| with_common_sizes(folder.look_at_pairs(indices, (wanted, &bar)), &wanted.board);
     let total = pairing.pairs.len();
+    let [first, rest] = first_pairs(total);
+    // The others are not looked at where the first show another board.
+    let bar = progress::bar("looking for the board", 2 * first.len() as u64);
+    let look_at = |indices: &[usize]| with_common_sizes(folder.look_at_pairs(indices, (wanted, &bar)), &wanted.board);
     let too_few = |found: usize, (skipped, searched): (Vec<Skipped>, usize), other: Option<Board>| Error::TooFewPairs {
         found,
         total: searched,
@@ -65,7 +67,6 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         skipped,
         other: other.map(Box::new),
     };
-    let [first, rest] = first_pairs(total);
     let mut seen: Vec<(usize, [Look; 2])> = first.iter().copied().zip(look_at(&first)).collect();
     if let Some(other) = shown_instead(seen.iter().map(|(_, looks)| looks)).filter(|_| !rest.is_empty()) {
         bar.finish_and_clear();
@@ -73,6 +74,7 @@ pub fn find_corners(pairing: &Pairing, wanted: &Wanted<'_>) -> Result<Corners> {
         let skipped = sort_out(&files, seen.into_iter().map(|(_, looks)| looks).collect(), wanted.board).skipped;
         return Err(too_few(0, (skipped, first.len()), Some(other)));
     }
+    bar.lengthen(2 * rest.len() as u64);
     seen.extend(rest.iter().copied().zip(look_at(&rest)));
     seen.sort_by_key(|&(i, _)| i);
     bar.finish_and_clear();

@@ -69,15 +69,36 @@ pub fn read_pose_list(path: &Utf8Path) -> Result<(Vec<RobotPose>, Option<String>
         Ok((*line, Fields::new(named.into_iter().chain(readings))))
     };
     let rows = (0..part.rows.len()).map(row).collect::<Result<Vec<_>>>()?;
+    let taken: Vec<usize> = picked.joints.iter().map(|at| at.column).chain([name]).chain(group).chain(role).collect();
     let said = format!(
-        "{}: {}; joints from {} in {}; pose = {}",
+        "{}: {}; joints from {} in {}; pose = {}{}",
         part.file_name(),
         count(part.rows.len(), "row"),
         listed(&parts, &picked.joints),
         unit.word(),
-        part.column_name(name)
+        part.column_name(name),
+        not_used(part, &taken)
     );
     Ok((Table::new(path, header, rows)?.poses(None)?, Some(said)))
+}
+
+/// The columns that are not taken, and what one that parts the rows may be for.
+fn not_used(part: &Part, taken: &[usize]) -> String {
+    let left: Vec<usize> = (0..part.width()).filter(|column| !taken.contains(column)).collect();
+    let name = |column: &usize| part.column_name(*column);
+    let parts_rows = |column: &usize| {
+        let values: BTreeSet<&str> = part.rows.iter().map(|(_, row)| row[*column].trim()).collect();
+        // A value of one row alone is none of a group.
+        (2..=part.rows.len() / 2).contains(&values.len())
+            && matches!(part.kinds[*column], Kind::Words | Kind::Counts | Kind::Numbers)
+    };
+    let group = left.iter().find(|column| parts_rows(column)).map_or(String::new(), |column| {
+        format!(" (call {} `group` if it says where the robot or the sensor stood)", name(column))
+    });
+    if left.is_empty() {
+        return String::new();
+    }
+    format!("; not used: {}{group}", left.iter().map(name).collect::<Vec<_>>().join(", "))
 }
 
 /// The joints by their names; where no column has one that is understood, the columns of numbers.
@@ -151,6 +172,7 @@ mod tests {
         };
         let cells = |numbers: &[f64], by: &str| numbers.iter().map(f64::to_string).collect::<Vec<_>>().join(by);
         let plain = |pose: &RobotPose| format!("{},{}", pose.pose, cells(&pose.joints_deg, ","));
+        let noted = |pose: &RobotPose| format!("{},seen", plain(pose));
         let files = |pose: &RobotPose| format!("{},left\\\\{}.PNG", cells(&pose.joints_deg, ","), pose.pose);
         let semicolons = |pose: &RobotPose| format!("{};{}", pose.pose, cells(&pose.joints_deg, ";")).replace('.', ",");
         let in_radians = |pose: &RobotPose| {
@@ -159,6 +181,7 @@ mod tests {
         };
         for (text, says) in [
             (of("name,J1,J2,J3,J4", &plain), "3 rows; joints from J1 to J4 in degrees; pose = name"),
+            (of("name,J1,J2,J3,J4,Note", &noted), "; pose = name; not used: Note"),
             (of("J1,J2,J3,J4,image", &files), "pose = image"),
             (of("Pose;A1;A2;A3;A4", &semicolons), "joints from A1 to A4"),
             (of("q1 [rad],q2 [rad],q3 [rad],q4 [rad],left picture", &in_radians), "in radians; pose = left picture"),
@@ -172,6 +195,16 @@ mod tests {
             };
             assert!(poses.len() == 3 && poses.iter().zip(&expected).all(near), "{text}{poses:?}");
         }
+    }
+
+    #[test]
+    fn a_column_that_parts_the_rows_is_named() {
+        let text = "Name;Gruppe;A1;A2;A3;A4\na;1;1,5;20;3;4\nb;1;2,5;30;3,5;4\nc;2;9;11;40;-5\nd;2;90;45;-8;4,5\n";
+        let (_, said) = read("poses.csv", text).unwrap();
+        let told = "pose = Name; not used: Gruppe (call Gruppe `group` if it says where the robot or the sensor stood)";
+        assert!(said.as_ref().is_some_and(|said| said.ends_with(told)), "{said:?}");
+        let (poses, said) = read("poses.csv", &text.replace("Gruppe", "group")).unwrap();
+        assert!(poses[3].group == "2" && said.is_some_and(|said| said.ends_with("pose = Name")), "{poses:?}");
     }
 
     #[test]

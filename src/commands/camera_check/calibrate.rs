@@ -190,20 +190,15 @@ fn open(args: &CameraCheck, config: &Config, run: Run) -> Result<OutDir> {
 /// The check board, as it was printed and as large as its temperature makes it; what a caliper leaves uncertain of it,
 /// mm.
 fn board(args: &CameraCheck, config: &Config, pairing: Option<&Pairing>) -> Result<(Board, Option<f64>)> {
-    /// How many times larger squares are none that were printed otherwise or measured over fewer of them.
-    const LARGER: f64 = 1.6;
     let squares = squares(args, pairing)?;
     let drawn = config.check_board.board(args.board, squares, args.square_mm)?;
     let Some(extent) = args.measured_mm else {
         return Ok((warm(args, drawn)?, None));
     };
     let invalid = |problem| config::Error::Invalid { problems: vec![problem] };
-    // Of a size that nobody gave the extent alone tells it, where it is too large for a mistake about the one assumed.
     let is_assumed = config.check_board.size_is_assumed(args.board, args.square_mm).is_some();
-    let scaled = extent.scaled(&drawn);
-    let is_other = is_assumed && scaled.square_mm > LARGER * drawn.square_mm && extent.of(&scaled).is_ok();
-    let drawn = if is_other { scaled } else { drawn };
-    let Printed { board, uncertainty_mm } = extent.of(&drawn).map_err(invalid)?;
+    let printed = if is_assumed { extent.of_any_size(&drawn) } else { extent.of(&drawn) };
+    let Printed { board, uncertainty_mm } = printed.map_err(invalid)?;
     let [measured, said] = [board, drawn].map(|board| board.side_said());
     let said = match is_assumed {
         true => String::new(),

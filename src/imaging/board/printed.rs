@@ -9,6 +9,9 @@ use std::str::FromStr;
 
 use super::certificate::{Board, Kind, MOST_STRETCH};
 
+/// What to do where the inner corners' extent was measured.
+const OF_INNER: &str = "measure from the outer edge of the first square to that of the last";
+
 /// Largest error of a caliper over up to 300 mm, mm (DIN 862).
 const CALIPER_MM: f64 = 0.03;
 
@@ -49,9 +52,43 @@ pub struct Printed {
 
 impl PrintedExtent {
     /// A board as large as this extent, whatever size it has.
-    pub fn scaled(&self, board: &Board) -> Board {
+    fn scaled(&self, board: &Board) -> Board {
         let [width, height] = board.extent_mm();
         board.scaled((self.mm[0] + self.mm[1]) / (width + height))
+    }
+
+    /// The board with this extent where nobody said how large its squares are: they are `assumed` to be so large, which
+    /// the extent overrules where it is no small mistake. The reason where the unit or what was measured is in doubt.
+    pub fn of_any_size(&self, assumed: &Board) -> Result<Printed, String> {
+        /// How many times larger squares are none that were printed otherwise or measured over fewer of them.
+        const LARGER: f64 = 1.6;
+        let scaled = self.scaled(assumed);
+        let [width, height] = self.mm;
+        match self.of(&scaled) {
+            Ok(printed) if scaled.square_mm > LARGER * assumed.square_mm => Ok(printed),
+            Ok(_) if LARGER * scaled.square_mm < assumed.square_mm => {
+                let [across, along] = self.mm.map(|value| as_written_mm(10.0 * value));
+                Err(format!(
+                    "a printed extent of {width} x {height} mm makes {}: if it was read in cm, it is `--measured-mm {across}x{along}`; if the squares are                      so small, say so as well: `--square-mm {}`",
+                    scaled.said(),
+                    (scaled.square_mm * 1e3).round() / 1e3
+                ))
+            }
+            Err(_) if self.is_inner_of_any_size(assumed) => Err(format!(
+                "a printed extent of {width} x {height} mm has the shape of what the inner corners of {} {} span: {OF_INNER}",
+                assumed.squares,
+                assumed.unit()
+            )),
+            _ => self.of(assumed),
+        }
+    }
+
+    /// Whether the extent is as wide as high as what the inner corners span, whatever the board's size, and not as the
+    /// whole board is.
+    fn is_inner_of_any_size(&self, board: &Board) -> bool {
+        let inner = [board.spans_mm(board.columns() - 1)[0], board.spans_mm(board.rows() - 1)[1]];
+        let is = |mm: [f64; 2]| (mm[0] / inner[0] / (mm[1] / inner[1]) - 1.0).abs() <= MOST_STRETCH;
+        is(self.mm) || !board.is_coded() && is([self.mm[1], self.mm[0]])
     }
 
     /// The board with this extent; the reason where it is not the extent of it.
@@ -128,7 +165,7 @@ impl PrintedExtent {
         } else if is_exchanged {
             "width and height are exchanged".to_owned()
         } else if is_inner {
-            "that is the extent of its inner corners: measure from the outer edge of the first square to that of the last".to_owned()
+            format!("that is the extent of its inner corners: {OF_INNER}")
         } else {
             let scale = [width / nominal[0], height / nominal[1]];
             let percent = scale.map(|scale| 100.0 * (scale - 1.0));
@@ -196,8 +233,21 @@ mod tests {
     fn of_a_size_that_nobody_gave_the_extent_alone_tells_it() {
         let extent: PrintedExtent = "266.5x210".parse().unwrap();
         let said = "checker:9x7:30".parse().unwrap();
-        let nobody = extent.scaled(&"checker:9x7:10".parse().unwrap());
-        assert_eq!(extent.of(&nobody).unwrap(), extent.of(&said).unwrap());
+        let assumed = "checker:9x7:10".parse().unwrap();
+        assert_eq!(extent.of_any_size(&assumed).unwrap(), extent.of(&said).unwrap());
+        for (extent, why) in [
+            (
+                "26.65x21",
+                "if it was read in cm, it is `--measured-mm 266.5x210`; if the squares are so small, say so as well: `--square-mm 2.98`",
+            ),
+            ("210x150", "span: measure from the outer edge of the first square"),
+            ("150x210", "span: measure from the outer edge of the first square"),
+            ("80.1x62", "printed -11.2 % in size"),
+            ("266.5x260", "other counts"),
+        ] {
+            let said = extent.parse::<PrintedExtent>().unwrap().of_any_size(&assumed).unwrap_err();
+            assert!(said.contains(why), "{extent}: {said}");
+        }
     }
 
     #[test]

@@ -10,7 +10,7 @@ use nalgebra::DVector;
 
 use crate::diagnostic::two_digits;
 use crate::difference::{Difference, TOLD_APART};
-use crate::stereo::findings::hypothesis::{Hypothesis, any_place, centred, refocused};
+use crate::stereo::findings::hypothesis::{Hypothesis, any_axis, any_place, centred, refocused};
 use crate::stereo::findings::series::Change;
 use crate::stereo::model::Layout;
 use crate::stereo::pairs::Cause;
@@ -20,6 +20,8 @@ enum What<'a> {
     One(&'a Hypothesis),
     /// The lens of a side was focused otherwise: its focal length and where its picture lies.
     Refocused(Side),
+    /// The right camera turned about any axis: what holds it gives way along one that is none of its own.
+    Turned,
     /// The right camera stands and looks otherwise, in all six numbers.
     Elsewhere,
 }
@@ -45,8 +47,13 @@ impl<'a> Candidate<'a> {
         };
         let one = |h: &'a Hypothesis| of(What::One(h), vec![h.direction.clone()]);
         let mut all: Vec<Candidate> = hypotheses.iter().filter_map(one).collect();
-        // Several numbers of a step need more pairs than they are; several that drift at once are no cause.
-        let tells = |numbers: usize| is_step && pairs > numbers + 2;
+        // Several numbers need more pairs than they are; several that drift at once are no cause, but those of one turn.
+        let are_enough = |numbers: usize| pairs > numbers + 2;
+        let tells = |numbers: usize| is_step && are_enough(numbers);
+        let axes = any_axis(layout, rig);
+        if are_enough(axes.len()) {
+            all.extend(of(What::Turned, axes.to_vec()));
+        }
         let place = any_place(layout);
         if tells(place.len()) {
             all.extend(of(What::Elsewhere, place));
@@ -72,7 +79,7 @@ impl<'a> Candidate<'a> {
         match self.what {
             What::One(h) => h.cause,
             What::Refocused(_) => Cause::Focus,
-            What::Elsewhere => Cause::CameraMoved,
+            What::Turned | What::Elsewhere => Cause::CameraMoved,
         }
     }
 
@@ -93,6 +100,7 @@ impl<'a> Candidate<'a> {
         match self.what {
             What::One(h) => (amounts[0], h.unit),
             What::Refocused(_) => (amounts[0], "%"),
+            What::Turned => (amounts.norm(), "deg"),
             What::Elsewhere => (amounts.rows(0, 3).norm().to_degrees(), "deg"),
         }
     }
@@ -106,6 +114,10 @@ impl<'a> Candidate<'a> {
                 "the {} lens was focused otherwise (focal length by {size:.3} %, its picture moved by {:.2} px)",
                 side.name(),
                 amounts[1].hypot(amounts[2])
+            ),
+            What::Turned => format!(
+                "the right camera turned by {size:.3} deg ({:.3} about its horizontal, {:.3} about its vertical axis, {:.3} about its line of sight)",
+                amounts[0], amounts[1], amounts[2]
             ),
             What::Elsewhere => format!("the right camera stands and looks otherwise by {size:.3} deg"),
         }

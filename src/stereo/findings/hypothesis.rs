@@ -19,16 +19,16 @@ pub struct Hypothesis {
 /// All causes of one number each.
 pub fn all(layout: &Layout, rig: &Rig) -> Vec<Hypothesis> {
     let translation = rig.right_from_left.translation.vector;
-    let turn = |axis: Vector3<f64>| turned(layout, rig, axis * 1f64.to_radians());
+    let [about_x, about_y, about_z] = any_axis(layout, rig);
     let focal = |sides: &[Side]| refocused(layout, rig, sides, 0.01);
     let longer = moved(layout, translation / translation.norm().max(f64::MIN_POSITIVE));
     // Larger squares make everything seem nearer, the baseline too; one unit is a per cent.
     let larger = moved(layout, -0.01 * translation);
     let of = |cause, words, direction, unit| Hypothesis { cause, words, direction, unit };
     vec![
-        of(Cause::Yaw, "the right camera turned about its vertical axis", turn(Vector3::y()), "deg"),
-        of(Cause::Pitch, "the right camera turned about its horizontal axis", turn(Vector3::x()), "deg"),
-        of(Cause::Roll, "the right camera turned about its line of sight", turn(Vector3::z()), "deg"),
+        of(Cause::Yaw, "the right camera turned about its vertical axis", about_y, "deg"),
+        of(Cause::Pitch, "the right camera turned about its horizontal axis", about_x, "deg"),
+        of(Cause::Roll, "the right camera turned about its line of sight", about_z, "deg"),
         of(Cause::Baseline, "the baseline changed", longer, "mm"),
         of(Cause::CameraMoved, "the right camera moved along its line of sight", moved(layout, Vector3::z()), "mm"),
         of(Cause::CameraMoved, "the right camera moved up or down", moved(layout, Vector3::y()), "mm"),
@@ -68,6 +68,11 @@ pub fn refocused(layout: &Layout, rig: &Rig, sides: &[Side], share: f64) -> DVec
 pub fn centred(layout: &Layout, side: Side) -> [DVector<f64>; 2] {
     let at = layout.camera_start(side) + 2;
     [at, at + 1].map(|at| DVector::from_fn(layout.count(), |i, _| f64::from(i == at)))
+}
+
+/// The three directions of any turn of the right camera about its own centre, by a degree each.
+pub fn any_axis(layout: &Layout, rig: &Rig) -> [DVector<f64>; 3] {
+    [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| turned(layout, rig, axis * 1f64.to_radians()))
 }
 
 /// The six directions of any other place of the right camera.

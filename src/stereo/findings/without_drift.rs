@@ -3,7 +3,8 @@
 //! In: a calibration from all pairs, their corners, and the drift that was found. Out: the calibration of the same
 //! corners, each moved by what the drift did to it since that moment. Without this the drift would count as scatter of
 //! the pairs, although it is known, and the rig's covariance would be several times too large. The corners of the
-//! result are those that were seen: what is held out is not smoothed by the finding. Goes wrong: pairs that are chosen
+//! result are those that were seen, and the boards lie as the rig sees them: neither residuals nor what is held out are
+//! smoothed by the finding. Goes wrong: pairs that are chosen
 //! otherwise without the drift; then there is no result.
 
 use nalgebra::{Point2, Vector2};
@@ -44,11 +45,13 @@ pub fn at_share(
     if still.pair_names() != found.pair_names() {
         return None;
     }
-    for (view, shifts) in still.views.iter_mut().zip(&shifts) {
+    for ((view, shifts), pose) in still.views.iter_mut().zip(&shifts).zip(&mut still.values.poses) {
         for o in &mut view.observations {
             let shift = shifts.iter().find(|shift| shift.side == o.side && shift.moved == o.px)?;
             o.px = shift.seen;
         }
+        // The board's place takes up what it can of the drift, as it does where this rig measures.
+        *pose = board_pose::follow(&still.values.shared, view, *pose)?;
     }
     let Calibration { alone_px, skipped, discarded, standing, .. } = found.clone();
     Some(Calibration { alone_px, skipped, discarded, standing, ..still })

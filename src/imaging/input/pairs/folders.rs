@@ -3,6 +3,7 @@
 
 use super::explain;
 use super::listing::{Folder, list, tree};
+use super::matching::in_order;
 use super::pairing::{Pairing, Source};
 use super::readings::{self, Reading, Told};
 use crate::imaging::{Error, Result};
@@ -67,7 +68,12 @@ impl Source<'_> {
         }
         let Reading { matched, sideless, aside, sides: [left, right], .. } = reading;
         let place = self.places().iter().map(|p| p.as_str()).collect::<Vec<_>>().join(" and ").into();
-        let could_be_in_order = !matched.single.is_empty() && left.len() == right.len() && self.by.is_none();
+        let as_many = !matched.single.is_empty() && left.len() == right.len() && self.by.is_none();
+        // Where the order parts pictures of one name, it is not that of the pairs.
+        let could_be_in_order = as_many && {
+            let ordered = in_order([&left, &right]).pairs;
+            matched.pairs.iter().all(|pair| ordered.iter().any(|o| o.left == pair.left && o.right == pair.right))
+        };
         let (pairs, single) = (matched.pairs, matched.single);
         Ok(Pairing { place, pairs, taken, single, could_be_in_order, sideless, aside })
     }

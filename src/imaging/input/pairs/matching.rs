@@ -237,7 +237,7 @@ fn plain(number: &str) -> &str {
     if plain.is_empty() { number.get(number.len().saturating_sub(1)..).unwrap_or_default() } else { plain }
 }
 
-fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
+pub(super) fn in_order(sides: [&[Utf8PathBuf]; 2]) -> Matched {
     let [left, right] = sides.map(|paths| {
         let mut sorted = paths.to_vec();
         sorted.sort_by(|a, b| natural_order(stem(a), stem(b)));

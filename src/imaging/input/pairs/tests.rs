@@ -93,10 +93,12 @@ fn what_is_left_out_is_said() {
         ),
         ("cam0/{1,2,3}.png cam1/{1,3}.png", "1 3", "1 picture without a partner (2.png)"),
         (
-            "cam0/{1,2,3}.png cam1/{2,3,4}.png",
-            "2 3",
-            "2 pictures without a partner (1.png, 4.png), as many on each side: `--pair-by order` pairs all in the order of their names",
+            "cam0/{1,2,3b,4}.png cam1/{1,2,3,4}.png",
+            "1 2 4",
+            "2 pictures without a partner (3.png, 3b.png), as many on each side: `--pair-by order` pairs all in the order of their names",
         ),
+        // One is missing on either side: in their order all pictures between these would be another pair's.
+        ("cam0/{1,2,3}.png cam1/{2,3,4}.png", "2 3", "2 pictures without a partner (1.png, 4.png)"),
         // What lies beside pictures does not mislead.
         (
             "left/{2,10}.png left/Thumbs.db left/.hidden.png left/._10.png left/2.xml right/{2,10}.png right/calib.yml \

@@ -51,9 +51,10 @@ pub(super) fn findings(case: &Case) -> Evidence {
     } else if !left.is_empty() && left.iter().all(board_moved) {
         "hold the board still while its pictures are taken, and photograph again"
     } else {
-        "clamp the cameras, switch autofocus off, and photograph again"
+        let of_finding = left.iter().find_map(|finding| finding.remedy.as_deref());
+        of_finding.unwrap_or("clamp the cameras, switch autofocus off, and photograph again")
     };
-    Evidence::of_length("changes over the pairs", remedy, Some(value), case, detail)
+    Evidence::of_length("changes over the pairs", remedy.to_owned(), Some(value), case, detail)
 }
 
 pub(super) fn pair_scatter(case: &Case) -> Evidence {
