@@ -2,6 +2,7 @@
 
 mod bursts;
 mod lenses;
+mod turns;
 
 use nalgebra::Vector3;
 

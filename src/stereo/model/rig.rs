@@ -153,7 +153,7 @@ impl Rig {
         let side = Side::BOTH.into_iter().find(|side| tilt_deg(*side) > MOST_DEG)?;
         Some(format!(
             "the {} camera's sensor comes out tilted by {:.1} deg, more than sensors are unless they are meant to be: centres and axes of these cameras \
-             may not be theirs; `--lens brown5` shows how lengths compare",
+             may not be theirs; `--lens brown5` calibrates without a tilt: compare its held-out lengths with these",
             side.name(),
             tilt_deg(side)
         ))
