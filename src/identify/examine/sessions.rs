@@ -14,6 +14,7 @@
 
 mod along;
 mod drift;
+mod placements;
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -25,6 +26,7 @@ use self::drift::{Drift, Moves};
 use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::{Dataset, Group};
 use crate::identify::data::shared;
+use crate::identify::examine::misfit::IMPLAUSIBLE_MM;
 use crate::identify::judge::recheck::zero;
 use crate::identify::residuals::distances::Origin;
 use crate::identify::residuals::eliminate::Block;
@@ -62,10 +64,16 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let extras = shared::unknowns(set, settings);
     let (mut look, mut gross) = (Look::Uncapped, Vec::new());
     let mut drifts: Vec<Drift> = Vec::new();
-    for _ in 0..MOST_CUTS {
+    for round in 0..MOST_CUTS {
         let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task, look) else { break };
+        // A step that is not linear is looked for where links that are fitted leave more than any robot.
+        let of_step = (round == 0 && search.left_mm >= IMPLAUSIBLE_MM).then_some(search.left_mm);
+        if let Some(parted) = of_step.and_then(|left_mm| placements::parted(set, robot, settings, left_mm)) {
+            cut = parted;
+            continue;
+        }
         let found = search.best_cut(&along.drifting);
         for drift in search.drifts(found) {
             if !along.drifting.contains(&drift.group) {
@@ -91,6 +99,12 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     }
     if cut.groups.len() > set.groups.len() {
         along.sessions = list(&cut);
+        if !drifts.is_empty() {
+            let rows: Vec<usize> = set.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
+            let task = Task { extras: &extras, ..Task::plain(set, robot, &parameters, &rows, settings) };
+            drift::without_steps(&mut drifts, &task, &cut);
+            along.drifting.retain(|group| drifts.iter().any(|drift| drift.group == *group));
+        }
     }
     along.instead = drift::of_joints(&drifts, robot, set.groups.len() > 1);
     along.step = drift::step(&drifts);
@@ -138,6 +152,8 @@ struct Search<'a> {
     placed: Vec<Placed>,
     /// Whether a row is so far off that it may be a gross error.
     is_doubtful: bool,
+    /// Scatter of a coordinate that the fit left, mm.
+    left_mm: f64,
     /// Numbers measured, how many of them the fit left, and the sum of their squares.
     numbers: f64,
     freedom: f64,
@@ -149,6 +165,7 @@ impl<'a> Search<'a> {
         let robust = task.robust(Loss::Absolute).ok()?.capped(if look == Look::Capped { GROSS } else { f64::INFINITY });
         let sigmas = task.settings.outlier_sigmas;
         let is_doubtful = sigmas > 0.0 && task.rows.iter().any(|&row| robust.scores[row] > sigmas);
+        let left_mm = robust.scatter.point_mm;
         let (rows, problem, prior) = robust.linearised();
         let parts: Vec<(&Block, &Placement, DMatrix<f64>)> = rows
             .blocks
@@ -201,7 +218,8 @@ impl<'a> Search<'a> {
                 Block::Pairwise(_) => {}
             }
         }
-        Some(Search { set: task.set, placed, is_doubtful, numbers: numbers as f64, freedom: freedom as f64, squares })
+        let (numbers, freedom) = (numbers as f64, freedom as f64);
+        Some(Search { set: task.set, placed, is_doubtful, left_mm, numbers, freedom, squares })
     }
 
     fn pays(&self, gain: f64, unknowns: usize) -> bool {

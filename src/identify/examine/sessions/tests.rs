@@ -99,6 +99,22 @@ fn a_joint_that_creeps_is_told_from_a_sensor_that_drifts() {
     }
 }
 
+/// Steps that all go one way are none.
+#[test]
+fn a_sensor_that_moves_in_steps_is_no_drift() {
+    for (by_mm, seed) in [(0.5, 1), (2.0, 2), (5.0, 3)] {
+        let mut world = synthetic::planned(240, 0, 25.0, 0.02, seed, &|_| {});
+        world.rows.retain(|row| row.at.group == "g1" && row.at.role == Role::Sample);
+        for (k, row) in world.rows.iter_mut().enumerate() {
+            *synthetic::point(row) += Vector3::new(0.5, -0.6, 0.6) * by_mm * (k / 15) as f64;
+        }
+        let (_, along) = find(&Dataset::new(&world.rows).unwrap(), &world.nominal, &Settings::default());
+        assert!(along.drifting.is_empty() && along.instead.is_none(), "{by_mm} mm: {along:?}");
+        let counts: Vec<usize> = along.sessions.iter().map(|session| session.count).collect();
+        assert_eq!(counts, [15; 4], "{by_mm} mm");
+    }
+}
+
 /// The same joint at once: the row and the size are said, and not that it creeps.
 #[test]
 fn a_joint_that_steps_is_told_from_one_that_creeps() {
