@@ -22,6 +22,10 @@ use crate::identify::sensor::Extra;
 /// explain it before.
 const FAR_BEYOND: f64 = 3.0;
 
+/// What is said of the figures beside links that explain nothing.
+const OF_FAR_LINKS: &str =
+    "the figures of `after` are of links that were taken farther from the file's than robots are built";
+
 /// How many times smaller than what lies between the points their scatter must be.
 const SMALL: f64 = 10.0;
 
@@ -58,16 +62,22 @@ impl Findings {
         let rounded = rounded::of_joints(set, found);
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
-        let is_far = is_far(found);
+        let (is_far, other) = (is_far(found), plausible::of_another_robot(found));
         let beyond_all = || (is_far && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
+        // A search that goes farther ends with less than what no links near the file's explain.
+        let is_farther = other.is_some() && !is_far;
+        let unexplained = unexplained.map(|finding| match is_farther {
+            true => Finding { action: format!("{}; {OF_FAR_LINKS}", finding.action), ..finding },
+            false => finding,
+        });
         let is_reached = unexplained.is_none();
         let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let many = many_left_out(set, found);
         // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of
         // rows that nothing explains it says nothing.
-        let (scale, other) = (scale(set, found).filter(|_| is_reached), plausible::of_another_robot(found));
+        let scale = scale(set, found).filter(|_| is_reached);
         // A scale that explains all links is why they are far off, and no other robot.
         let (of_links, scale) = if other.is_some() { (scale.or(other), None) } else { (None, scale) };
         let against: Vec<Finding> =
