@@ -66,9 +66,9 @@ pub enum Error {
         poses: usize,
     },
     #[error(
-        "{} {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed: at least {} more",
+        "{} {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed: at least {}",
         if *.poses == 1 { "1 pose gives".to_owned() } else { format!("{poses} poses give") },
-        count(*.more, "pose")
+        count(*.more, "more pose")
     )]
     TooFew {
         /// Independent numbers.

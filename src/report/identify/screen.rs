@@ -70,6 +70,13 @@ pub(super) fn advice(record: &Record) -> String {
 /// What to do with the robot that was found in `file`, which may be one of links alone. Without a file of the nominal
 /// robot it is that of the paper, of which a command writes one.
 fn next(record: &Record, robot: Option<&Utf8Path>, (file, of_links): (&str, bool)) -> String {
+    if let [(name, _), ..] = record.of_catalogue[..] {
+        return format!(
+            "the arm of the catalogue that the points are near is {}, its tool and the sensor solved: `stereocal robot new {name}`, and identify again \
+             with that file, if it is the arm",
+            arms(&record.of_catalogue)
+        );
+    }
     let Some(robot) = robot else {
         let named = "`--robot FILE` names the robot that was measured (`stereocal robot list` has arms by name)";
         return match record.advice {
@@ -97,17 +104,10 @@ fn next(record: &Record, robot: Option<&Utf8Path>, (file, of_links): (&str, bool
         Advice::KeepNominal => {
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
         }
-        Advice::DoNotUse => match &record.of_catalogue[..] {
-            [] => format!(
-                "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the \
-                 pendant, `stereocal robot list` for other arms"
-            ),
-            [(name, _), ..] => format!(
-                "the arm of the catalogue that the points are near is {}, its tool and the sensor solved: `stereocal robot new {name}`, and identify again \
-                 with that file, if it is the arm",
-                arms(&record.of_catalogue)
-            ),
-        },
+        Advice::DoNotUse => format!(
+            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the \
+             pendant, `stereocal robot list` for other arms"
+        ),
     }
 }
 

@@ -3,15 +3,15 @@
 //! In: points in the order of measurement, and the robot of the file. Out: the set with each group cut where another
 //! placement begins, or nothing. Method: for each number of placements the cuts with which the file's robot leaves the
 //! least squares, each stretch of rows with a rigid placement of its own (dynamic programming: Bellman, 1961), the
-//! target's place solved with them. They are steps where each stands out: with one placement the rows beside it leave
-//! more than with two, by far more than beside any row that is none, which errors that are smooth along the rows do
-//! not; and the links that are fitted then leave far less. What goes wrong: rows that are gross errors next to a cut;
+//! target's place solved with them, rows that are off by themselves left out. They are steps where each stands out:
+//! with one placement the rows beside it leave more than with two, by far more than beside any row that is none, which
+//! errors that are smooth along the rows do not; and the links that are fitted then leave far less. What goes wrong:
 //! stretches of fewer than twice [`SHORTEST`] rows, if all are so short; a robot file that is off by as much as the
 //! placements.
 
 use nalgebra::{DMatrix, Point3};
 
-use super::{SHORTEST, split};
+use super::{GROSS, SHORTEST, split};
 use crate::geometry::fitted_frame;
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::examine::misfit::{EXPLAINS, ROWS};
@@ -21,6 +21,7 @@ use crate::identify::settings::Settings;
 use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::Robot;
+use crate::statistics::median;
 
 /// Rounds in which the target's place is found beside the placements.
 const PLACING_ROUNDS: usize = 20;
@@ -46,6 +47,7 @@ pub(super) fn parted(set: &Dataset, robot: &Robot, settings: &Settings, left_mm:
 
 /// The rows of a group at which another placement begins.
 fn cuts(set: &Dataset, robot: &Robot, rows: &[usize]) -> Option<Vec<usize>> {
+    let rows = &without_lone(set, robot, rows)?;
     let step = rows.len().div_ceil(ROWS).max(1);
     let some: Vec<usize> = rows.iter().copied().step_by(step).collect();
     let others: Vec<usize> = (0..set.poses.len()).filter(|row| !some.contains(row)).collect();
@@ -71,6 +73,25 @@ fn cuts(set: &Dataset, robot: &Robot, rows: &[usize]) -> Option<Vec<usize>> {
         (ends[1] + 1 - step..=ends[1]).min_by(|a, b| left(a).total_cmp(&left(b)))
     };
     ends.windows(3).map(|ends| best(ends).map(|at| rows[at])).collect()
+}
+
+/// These rows without those that are off by themselves: of no placement they are as far from the rows around them as
+/// the robot has it.
+fn without_lone(set: &Dataset, robot: &Robot, rows: &[usize]) -> Option<Vec<usize>> {
+    let target = |row: usize| robot.target_mm(&set.poses[row].joints_rad);
+    let point = |row: usize| set.poses[row].reading.point_mm();
+    let off = |at: usize| {
+        let around = at.saturating_sub(SHORTEST / 2)..(at + SHORTEST / 2 + 1).min(rows.len());
+        let apart = around.filter(|other| *other != at).map(|other| (rows[at], rows[other]));
+        let off = |(a, b)| Some(((point(a)? - point(b)?).norm() - (target(a) - target(b)).norm()).abs());
+        let mut off: Vec<f64> = apart.map(off).collect::<Option<_>>()?;
+        // Beside a cut half of the others are of another placement, and some of the rest may be off themselves.
+        off.sort_by(f64::total_cmp);
+        off.get(SHORTEST / 4).copied()
+    };
+    let off: Vec<f64> = (0..rows.len()).map(off).collect::<Option<_>>()?;
+    let limit_mm = GROSS * median(off.iter().copied())?.max(REPEATABILITY_MM);
+    Some(rows.iter().zip(off).filter(|(_, off)| *off <= limit_mm).map(|(row, _)| *row).collect())
 }
 
 /// Where all but the first of so many placements begin that leave the least squares, of those of all stretches.
@@ -145,7 +166,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use crate::identify::synthetic::{World, planned};
+    use crate::identify::synthetic::{self, World, planned};
     use crate::measurements::Role;
 
     /// Rows of so many spheres, one after the other and each seen from a placement of its own, so many of each, as one
@@ -199,6 +220,19 @@ mod tests {
                 let sorted = Dataset::new(&world.rows).unwrap();
                 assert_eq!(begins(&world, &sorted), [0; 0], "along joint {}, {seed}", joint + 1);
             }
+        }
+    }
+
+    #[test]
+    fn rows_that_were_misread_hide_no_placement() {
+        for off_mm in [3.0, 30.0, 300.0, 3000.0] {
+            let (mut world, _) = in_blocks(3, 25, 3.0, 4);
+            for (k, row) in [2, 23, 27, 40, 66].into_iter().enumerate() {
+                let way = Vector3::new((k as f64).sin(), (k as f64).cos(), 0.5);
+                *synthetic::point(&mut world.rows[row]) += off_mm * way;
+            }
+            let set = Dataset::new(&world.rows).unwrap();
+            assert_eq!(begins(&world, &set), [25, 50], "{off_mm} mm");
         }
     }
 
