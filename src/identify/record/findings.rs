@@ -22,10 +22,6 @@ use crate::identify::sensor::Extra;
 /// explain it before.
 const FAR_BEYOND: f64 = 3.0;
 
-/// What is said of the figures beside links that explain nothing.
-const OF_FAR_LINKS: &str =
-    "the figures of `after` are of links that were taken farther from the file's than robots are built";
-
 /// How many times smaller than what lies between the points their scatter must be.
 const SMALL: f64 = 10.0;
 
@@ -65,12 +61,7 @@ impl Findings {
         let (is_far, other) = (is_far(found), plausible::of_another_robot(found));
         let beyond_all = || (is_far && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
-        // A search that goes farther ends with less than what no links near the file's explain.
-        let is_farther = other.is_some() && !is_far;
-        let unexplained = unexplained.map(|finding| match is_farther {
-            true => Finding { action: format!("{}; {OF_FAR_LINKS}", finding.action), ..finding },
-            false => finding,
-        });
+        let unexplained = unexplained.map(|finding| beside_far_links(finding, other.is_some() && !is_far));
         let is_reached = unexplained.is_none();
         let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
@@ -96,7 +87,6 @@ impl Findings {
             .filter(|_| scale.is_none())
             .or_else(|| plausible::of_all_lengths(found))
             .filter(|_| against.is_empty());
-        let terms = plausible::of_terms(found);
         let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined
             .into_iter()
@@ -107,7 +97,7 @@ impl Findings {
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
-            .chain(terms)
+            .chain(plausible::of_terms(found))
             .chain(far_beyond)
             .collect();
         Findings { against, beyond, doubts, notes }
@@ -118,6 +108,12 @@ impl Findings {
         let first = self.against.iter().chain(&self.beyond);
         first.chain(&self.doubts).chain(&self.notes).cloned().collect()
     }
+}
+
+/// What no links near the file's explain, where a search that goes farther ends with less.
+fn beside_far_links(finding: Finding, is_farther: bool) -> Finding {
+    let figures = "the figures of `after` are of links that were taken farther from the file's than robots are built";
+    if is_farther { Finding { action: format!("{}; {figures}", finding.action), ..finding } } else { finding }
 }
 
 /// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole

@@ -4,15 +4,9 @@
 //! joint that steps at a row. Out: a finding where a joint is among them. Goes wrong: a joint that creeps by a degree,
 //! of which all causes are linear: a sensor that moves has more unknowns to follow the rest.
 
-use nalgebra::DMatrix;
-
-use super::{Look, Placed, Search};
-use crate::difference::TOLD_APART;
 use crate::identify::data::dataset::Dataset;
 use crate::identify::finding::Finding;
 use crate::identify::judge::recheck::zero;
-use crate::identify::solve::linearised::Fresh;
-use crate::identify::solve::task::Task;
 use crate::robot::Robot;
 
 /// What moves along the rows of a group: the likeliest first, and what is not told from it.
@@ -35,39 +29,6 @@ impl Moves {
         /// Six degrees, whose sine and cosine are an angle and one to half a per cent.
         const LINEAR_MRAD: f64 = 100.0;
         self.joint.is_none_or(|joint| set.is_sliding(joint) || self.amount.abs() < LINEAR_MRAD)
-    }
-}
-
-/// Leaves out those of groups of which placements that begin where they are cut explain clearly more than what moves
-/// evenly does; `whole` is the task of the rows before any cut.
-pub(super) fn without_steps(drifts: &mut Vec<Drift>, whole: &Task, cut: &Dataset) {
-    let Some(search) = Search::new(whole, Look::Uncapped) else { return };
-    let steps = |placed: &Placed| search.steps(placed, cut) > search.evenly(placed) + TOLD_APART;
-    let of_steps: Vec<&String> = search.placed.iter().filter(|p| steps(p)).map(|p| search.name(p)).collect();
-    drifts.retain(|drift| !of_steps.contains(&&drift.group));
-}
-
-impl Search<'_> {
-    /// The likelihood of a placement, or of the zero of a joint, that moves evenly along the rows.
-    fn evenly(&self, placed: &Placed) -> f64 {
-        let order: Vec<usize> = (0..placed.rows.len()).collect();
-        let ramps = placed.causes().map(|(_, of)| self.likelihood(placed.ramp(of, &order).0, of.columns.ncols()));
-        ramps.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// The same of placements that begin where the rows are cut. Each row of a cut is an unknown more.
-    fn steps(&self, placed: &Placed, cut: &Dataset) -> f64 {
-        let group = |k: usize| cut.poses[placed.rows[k].0].group;
-        let begins = (1..placed.rows.len()).filter(|&k| group(k) != group(k - 1)).map(|k| placed.rows[k].1.start);
-        let begins: Vec<usize> = begins.collect();
-        let own = placed.fresh.columns.ncols();
-        let columns = DMatrix::from_fn(placed.fresh.columns.nrows(), own * begins.len(), |row, column| {
-            if row < begins[column / own] { 0.0 } else { placed.fresh.columns[(row, column % own)] }
-        });
-        let fresh = Fresh { columns, ..placed.fresh.clone() };
-        let mut products = fresh.nothing();
-        placed.rows.iter().for_each(|(_, at)| fresh.add(&mut products, at, 1.0));
-        self.likelihood(fresh.gain(&products), (own + 1) * begins.len())
     }
 }
 

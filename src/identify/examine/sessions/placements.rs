@@ -11,9 +11,8 @@
 
 use nalgebra::{DMatrix, Point3};
 
-use super::{GROSS, SHORTEST, split};
 use crate::geometry::fitted_frame;
-use crate::identify::data::dataset::{Dataset, Kind};
+use crate::identify::data::dataset::{Dataset, Group, Kind};
 use crate::identify::examine::misfit::{EXPLAINS, ROWS};
 use crate::identify::examine::shifted;
 use crate::identify::sensor::REPEATABILITY_MM;
@@ -22,6 +21,13 @@ use crate::identify::solve::robust::Loss;
 use crate::identify::solve::task::Task;
 use crate::robot::Robot;
 use crate::statistics::median;
+
+/// Fewest fitted rows of a session: twice its own unknowns.
+pub const SHORTEST: usize = 8;
+
+/// Robust standard deviations from which on a row counts no more the farther it is off: a few that are off by metres
+/// would hide a step.
+pub(super) const GROSS: f64 = 8.0;
 
 /// Rounds in which the target's place is found beside the placements.
 const PLACING_ROUNDS: usize = 20;
@@ -158,6 +164,17 @@ impl Stretch {
         let clean = places.filter(|at| cuts.iter().all(|cut| cut.abs_diff(*at) >= SHORTEST));
         let usual = clean.map(|at| self.step(at)).reduce(f64::max);
         usual.is_some_and(|usual| cuts.iter().all(|cut| self.step(*cut) > EXPLAINS.powi(2) * usual))
+    }
+}
+
+/// Starts a new group at `row`: it and all later rows of its group move there.
+pub fn split(set: &mut Dataset, row: usize) {
+    let group = set.poses[row].group;
+    let name = set.groups[group].name.clone();
+    set.groups.push(Group { name, center: None });
+    let fresh = set.groups.len() - 1;
+    for pose in set.poses.iter_mut().skip(row).filter(|p| p.group == group) {
+        pose.group = fresh;
     }
 }
 

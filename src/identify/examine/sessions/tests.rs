@@ -2,7 +2,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::*;
 use crate::identify::synthetic;
-use crate::measurements::{Measurement, Observed};
+use crate::measurements::{Measurement, Observed, Role};
 
 /// Wire lengths to an anchor that moves by 5 mm after `moved` rows.
 fn wire(moved: usize) -> (synthetic::World, Vec<Measurement>) {
