@@ -32,12 +32,12 @@ pub fn run(args: &Identify, config: &Config, run: Run) -> Result<Outcome> {
         if args.measurements.is_empty() { vec![out.join("measurements.csv")] } else { args.measurements.clone() };
     let source = source(default, &args.table, config);
     let file = robot_file(args.robot.as_deref());
-    let given = nominal_robot(file.as_deref(), args.robot.is_some())?;
+    let given = nominal_robot(file.as_deref(), args.robot.is_some(), [&out, &config.out])?;
     let rows = read(&source, &given)?;
     let mut set = Dataset::of_robot(&rows, &given)?;
     still::check_points(&set, Some(&given))?;
     set.files = files(&source, &rows);
-    set.typed_unit = source.typed_length();
+    [set.typed_angle, set.typed_unit] = source.typed_units();
     if let Some(path) = &args.known_distances {
         set.known = known::read(path, &set)?;
     }
@@ -243,11 +243,14 @@ pub fn robot_file(path: Option<&Utf8Path>) -> Option<Utf8PathBuf> {
     path.or_else(|| Some(Utf8Path::new(DEFAULT_ROBOT)).filter(|file| file.is_file())).map(Utf8Path::to_owned)
 }
 
-fn nominal_robot(file: Option<&Utf8Path>, named: bool) -> Result<Robot> {
+/// The robot of a file, or where there is none that of the paper; another may lie in a results folder.
+fn nominal_robot(file: Option<&Utf8Path>, named: bool, results: [&Utf8Path; 2]) -> Result<Robot> {
     let Some(file) = file else {
-        progress::warn(
-            "the nominal robot is taken to be that of Table 1 of the paper: no --robot, and no robot.toml in this folder",
-        );
+        let there = results.map(|folder| folder.join(DEFAULT_ROBOT)).into_iter().find(|file| file.is_file());
+        let there = there.map_or(String::new(), |file| format!("; `--robot {file}` takes the one that is there"));
+        progress::warn(format!(
+            "the nominal robot is taken to be that of Table 1 of the paper: no --robot, and no robot.toml in this folder{there}"
+        ));
         return Ok(Robot::paper());
     };
     if !named {

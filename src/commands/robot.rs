@@ -7,8 +7,8 @@ use super::{Outcome, Result};
 use crate::cli::{DhConvention, RobotImport, RobotNew, RobotPlace, RobotShow, RobotWhat};
 use crate::config::Config;
 use crate::diagnostic::{Explain, Status};
-use crate::files::OutDir;
 use crate::files::provenance::Run;
+use crate::files::{self, OutDir};
 use crate::formats::robots::{dh_csv, ros_kinematics, urdf};
 use crate::measurements::{Measurement, Observed, Source, is_not_near};
 use crate::progress;
@@ -190,7 +190,16 @@ fn new(args: &RobotNew, config: &Config, run: Run) -> Result<String> {
 }
 
 fn write(robot: &Robot, place: &RobotPlace, config: &Config, run: Run, inputs: &[&Utf8Path]) -> Result<String> {
-    let out = OutDir::open(place.out.as_deref().unwrap_or(&config.out))?;
+    let folder = place.out.as_deref().unwrap_or(&config.out);
+    if folder.extension() == Some("toml") && !folder.is_dir() {
+        let message = "results go into a folder, and this is the name of a file".to_owned();
+        let hint = format!(
+            "the robot's file in it is called robot.toml: `--out {0}` writes {0}/robot.toml",
+            folder.with_extension("")
+        );
+        return Err(files::Error::format(folder, None, message, Some(&hint)).into());
+    }
+    let out = OutDir::open(folder)?;
     let path = out.join("robot.toml");
     if path.exists() && !place.force {
         return Err(Error::Occupied { path: path.to_string() }.into());

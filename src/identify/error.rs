@@ -66,8 +66,9 @@ pub enum Error {
         poses: usize,
     },
     #[error(
-        "{} {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed",
-        if *.poses == 1 { "1 pose gives".to_owned() } else { format!("{poses} poses give") }
+        "{} {numbers} independent numbers for {parameters} parameters; more numbers than parameters are needed: at least {}",
+        if *.poses == 1 { "1 pose gives".to_owned() } else { format!("{poses} poses give") },
+        count(*.more, "more pose")
     )]
     TooFew {
         /// Independent numbers.
@@ -76,6 +77,8 @@ pub enum Error {
         parameters: usize,
         /// Poses to fit.
         poses: usize,
+        /// Poses that are missing at the least.
+        more: usize,
     },
     /// Several targets a pose that cannot be made one.
     #[error("{message}")]

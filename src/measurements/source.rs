@@ -79,9 +79,10 @@ impl Source {
         }
     }
 
-    /// The unit of lengths that was typed.
-    pub fn typed_length(&self) -> Option<Unit> {
-        self.forced().lengths
+    /// The units of angles and of lengths that were typed.
+    pub fn typed_units(&self) -> [Option<Unit>; 2] {
+        let Forced { joints, lengths } = self.forced();
+        [joints, lengths]
     }
 
     /// Reads everything; the sentences say what was taken.

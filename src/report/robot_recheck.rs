@@ -46,7 +46,12 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
             recheck.unseen().map_or_else(String::new, |unseen| format!(", and nothing of: {unseen}"))
         ),
         false => {
-            format!("{statement}; the target is off by up to {} mm, tolerance {tolerance} mm", mm(recheck.effect_mm))
+            // A cause by itself is said of the base; the table has what another placement does not take up of it.
+            let base = if recheck.changed && !recheck.likeliest.is_empty() { " in the robot's base" } else { "" };
+            format!(
+                "{statement}; the target is off by up to {} mm{base}, tolerance {tolerance} mm",
+                mm(recheck.effect_mm)
+            )
         }
     };
     recheck.of_strays().map_or(of_rest.clone(), |strays| format!("{strays}; without: {of_rest}"))
@@ -163,7 +168,7 @@ fn lines(recheck: &Recheck) -> Table {
 /// The lines on stdout.
 pub fn summary(recheck: &Recheck, judged: Judged, checks: usize, out: &OutDir) -> String {
     format!(
-        "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target, once placed anew\n{}\n{} in {}\nreport: {}\n",
+        "{}: {}\nnext: {}\n\neach cause by itself, 95 % intervals; seen: from so much on; mm: at the target, once placed anew, which takes up a part\n{}\n{} in {}\nreport: {}\n",
         word(judged.standing),
         sentence(recheck, judged, |mm| format!("{mm:.4}")),
         next(judged, recheck),

@@ -45,6 +45,13 @@ pub(super) fn split(path: &Utf8Path) -> (Utf8PathBuf, Option<String>) {
     }
 }
 
+/// What to do where a path is a list of files that are there.
+fn of_several(path: &Utf8Path) -> Option<String> {
+    let parts: Vec<&str> = path.as_str().split(',').map(str::trim).collect();
+    let are_there = parts.len() > 1 && parts.iter().all(|part| split((*part).into()).0.is_file());
+    are_there.then(|| format!("the flag takes one file, and is repeated: once for each of {}", parts.join(" and ")))
+}
+
 /// Reads a file; `what` names it in the message when it is not there, `hint` says what makes it.
 pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<Source> {
     let (file, sheet) = split(path);
@@ -57,7 +64,11 @@ pub(super) fn read(path: &Utf8Path, what: &'static str, hint: &str) -> Result<So
         }
         Ok(_) => {}
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            return Err(Error::Missing { what, path: file, hint: Some(hint.to_owned()) });
+            return Err(Error::Missing {
+                what,
+                hint: Some(of_several(path).unwrap_or_else(|| hint.to_owned())),
+                path: file,
+            });
         }
         Err(source) => return Err(unreadable(&file, what, source)),
     }

@@ -149,6 +149,23 @@ fn what_cannot_be_reached_is_named_and_left_alone() {
 }
 
 #[test]
+fn poses_in_metres_are_asked_whether_they_are() {
+    let folder = workplace();
+    robots_of(folder.path(), "abb-irb120");
+    let said = |rows: &str, status: i32| {
+        let text = format!("name,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\n{rows}");
+        std::fs::write(folder.path().join("poses.csv"), text).unwrap();
+        run(folder.path(), &["poses.csv", "--force"], status)
+    };
+    let both = said("a,400,0,300,0,3.14159,0\nb,0.4,0,0.3,0,3.14159,0\n", 1);
+    let asked = "1 of the targets (b) would be reached with lengths 1000 times as long: are they metres?";
+    assert!(both.contains(asked) && both.contains("1 of 2 targets compensated"), "{both}");
+    // Neither in mm nor in metres.
+    let far = said("a,400,0,300,0,3.14159,0\nb,9000,0,300,0,3.14159,0\n", 1);
+    assert!(!far.contains("are they metres"), "{far}");
+}
+
+#[test]
 fn programs_keep_everything_but_their_joint_targets() {
     let folder = workplace();
     let (nominal, real) = robots(folder.path());

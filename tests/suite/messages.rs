@@ -48,7 +48,12 @@ fn what_a_beginner_mistypes() {
         &["left.mp4", "hint: `mkdir left; ffmpeg -i "],
     );
     refused(&["camera-check", "left.mp4"], &[("left.mp4", "")], 2, &["this is a file", "ffmpeg -i left.mp4 "]);
-    refused(&["robot", "new", "ur5e", "--out", "ur5e.toml"], &[], 2, &["the name of a file", "hint: `--out DIR`"]);
+    let called = "hint: the robot's file in it is called robot.toml: `--out ur5e` writes ur5e/robot.toml";
+    refused(&["robot", "new", "ur5e", "--out", "ur5e.toml"], &[], 2, &["the name of a file", called]);
+    let two = [("a.csv", ""), ("b.csv", "")];
+    let repeated = "hint: the flag takes one file, and is repeated: once for each of a.csv and b.csv";
+    refused(&["identify", "--measurements", "a.csv,b.csv"], &two, 2, &["measurements file not found", repeated]);
+    refused(&["identify", "--measurements", "a.csv,c.csv"], &two, 2, &["not found", "hint: `stereocal measure POSES`"]);
     refused(&["measure", "x"], &[("x/poses.csv", "")], 2, &["calibration file not found", "`--calibration FILE`"]);
     let robot = [("x/poses.csv", ""), ("robot.toml", "name = \"r\"")];
     refused(&["measure", "x", "--calibration", "robot.toml"], &robot, 2, &["this is no JSON", "camera-check IMAGES"]);

@@ -5,11 +5,12 @@ use std::collections::BTreeSet;
 use camino::{Utf8Path, Utf8PathBuf};
 
 use super::super::Result;
-use crate::compensate::Target;
+use crate::compensate::{Compensated, Target};
 use crate::files::provenance::{Digested, Provenance};
 use crate::formats::targets::Row;
 use crate::programs::{Language, unread};
 use crate::robot::{Robot, file};
+use crate::tables::names::Unit;
 use crate::{config, files, progress};
 
 /// Refuses targets that `compensate` itself wrote, which would be corrected twice: known by the hash in the
@@ -118,6 +119,38 @@ pub(super) fn warn(rows: &[Row], [(drawn, nominal), (found, robot)]: [(&Utf8Path
             open.join(", ")
         ));
     }
+}
+
+/// That poses which are not reached would be with lengths that are in metres; `compensated` is what becomes of rows.
+pub(super) fn of_lengths(
+    rows: &[Row],
+    found: &[Compensated],
+    compensated: impl Fn(&[Row]) -> Vec<Compensated>,
+) -> Option<String> {
+    let in_mm = |row: &Row| {
+        let mut row = row.clone();
+        let Target::Pose { root_from_tool, .. } = &mut row.target else { return None };
+        root_from_tool.translation.vector *= Unit::M.converted(1.0);
+        Some(row)
+    };
+    let refused = rows.iter().zip(found).filter(|(_, found)| found.readings.is_err());
+    let asked: Vec<Row> = refused.filter_map(|(row, _)| in_mm(row)).collect();
+    let reached = compensated(&asked);
+    let reached = asked.iter().zip(&reached).filter(|(_, there)| there.readings.is_ok());
+    let names: Vec<&str> = reached.map(|(row, _)| row.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{} of the targets ({}) would be reached with lengths 1000 times as long: are they metres? x_mm, y_mm and z_mm are read in mm",
+            names.len(),
+            listed(&names)
+        )
+    })
+}
+
+/// The first of some names.
+fn listed(names: &[&str]) -> String {
+    const SAID: usize = 4;
+    names.iter().take(SAID).copied().chain((names.len() > SAID).then_some("...")).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]

@@ -52,6 +52,7 @@ pub fn run(args: &Compensate, config: &Config, run: Run) -> Result<Outcome> {
     tell_of_postures(&rows);
     doubts::warn(&rows, [(&args.robot, nominal), (&args.identified, &pair.identified)]);
     let found = compensated(args, &pair, &rows);
+    doubts::of_lengths(&rows, &found, |rows| compensated(args, &pair, rows)).iter().for_each(progress::warn);
     let in_file = |readings: &[f64]| -> Vec<f64> {
         readings.iter().zip(&nominal.joints).map(|(r, joint)| if joint.slides { *r } else { r.to_degrees() }).collect()
     };

@@ -130,6 +130,8 @@ pub struct Dataset {
     pub files: Vec<String>,
     /// The unit of lengths that was typed, where one was.
     pub typed_unit: Option<Unit>,
+    /// That of angles.
+    pub typed_angle: Option<Unit>,
     /// Whether x of the points is negated against the file, whose frame is left-handed.
     pub mirrored: bool,
 }

@@ -76,7 +76,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         findings.extend(of_covariances);
     }
     findings.splice(0..0, of_targets);
-    let of_links = |left_mm| conventions::unexplained(&set, "the best fit of the links", left_mm);
+    let of_links = |left_mm| conventions::unexplained(&set, "the best fit of links near the file's", left_mm);
     let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(of_links);
     Examined { set, robot, along, findings, mended, against, unexplained }
 }

@@ -93,9 +93,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
         let rows = set.names(&hypothesis.rows(&set));
         (set, robot) = hypothesis.applied(&set, &robot);
         in_other_units |= hypothesis.factor() != 1.0;
-        let typed = set.typed_unit.filter(|_| hypothesis.factor() != 1.0);
-        let list = if rows.is_empty() && typed.is_none() { &mut findings } else { &mut against };
-        list.push(best.told(&now, typed).about(rows));
+        let typed = typed(hypothesis, &set);
+        let is_length = hypothesis.factor() != 1.0;
+        let list = if rows.is_empty() && !(is_length && typed.is_some()) { &mut findings } else { &mut against };
+        list.push(best.told(&now, typed, set.typed_unit).about(rows));
         left = there.scaled(1.0 / hypothesis.factor());
     }
     let unexplained_mm = (left.fitted >= IMPLAUSIBLE_MM && cut.is_none()).then_some(left.fitted);
@@ -170,8 +171,8 @@ impl Likeliest {
         Some(Likeliest { there, hypothesis, like, rivals })
     }
 
-    /// What is said of it where errors were `now`, and where another unit was typed.
-    fn told(&self, now: &Misfit, typed: Option<Unit>) -> Finding {
+    /// What is said of it where errors were `now`, and where another unit was typed; beside it perhaps one of `lengths`.
+    fn told(&self, now: &Misfit, typed: Option<Unit>, lengths: Option<Unit>) -> Finding {
         let Likeliest { there, hypothesis, like, .. } = self;
         let same: Vec<String> =
             like.iter().map(|h| format!(", or, which these readings do not tell apart, {}", h.name())).collect();
@@ -180,7 +181,7 @@ impl Likeliest {
         let says = typed.map_or_else(String::new, |unit| format!(" as `--units {}` says", unit.flag()));
         let finding = Finding::new(
             format!("{}{says}{} ({whose} fall from {from} to {to:.3} mm)", hypothesis.name(), same.concat()),
-            action(*hypothesis, like, typed),
+            action(*hypothesis, like, typed, lengths),
         );
         Finding { of_joints: hypothesis.is_of_counting(), ..finding }
     }
@@ -205,10 +206,26 @@ fn suits(hypothesis: Hypothesis, set: &Dataset, robot: &Robot) -> bool {
     known::are_of_unit(set, robot, unit_mm)
 }
 
+/// The unit that was typed, where another one is said of the same.
+fn typed(hypothesis: Hypothesis, set: &Dataset) -> Option<Unit> {
+    match hypothesis {
+        Hypothesis::Lengths(..) => set.typed_unit,
+        Hypothesis::Angles(read_as, _) => set.typed_angle.filter(|typed| *typed == read_as),
+        _ => None,
+    }
+}
+
 /// What was done about a hypothesis, and what is to be mended, of it or of what is not told apart from it.
-fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>) -> String {
-    if let (Some(_), Hypothesis::Lengths(.., unit)) = (typed, hypothesis) {
-        return format!("`--units {}` says so, if the robot file is the right one", unit.flag());
+fn action(hypothesis: Hypothesis, others: &[Hypothesis], typed: Option<Unit>, lengths: Option<Unit>) -> String {
+    match (typed, hypothesis) {
+        (Some(_), Hypothesis::Lengths(.., unit)) => {
+            return format!("`--units {}` says so, if the robot file is the right one", unit.flag());
+        }
+        (Some(_), Hypothesis::Angles(_, unit)) => {
+            let units: Vec<&str> = iter::once(unit).chain(lengths).map(Unit::flag).collect();
+            return format!("mended for this run; `--units {}` says so", units.join(","));
+        }
+        _ => {}
     }
     let mut mend: Vec<String> = Vec::new();
     for place in iter::once(&hypothesis).chain(others).map(|hypothesis| hypothesis.mend()) {
@@ -228,7 +245,8 @@ pub fn unexplained(set: &Dataset, fit: &str, left_mm: f64) -> Finding {
     Finding::new(
         format!(
             "{fit} leaves {left_mm:.2} mm a coordinate, implausible for a real robot: the robot file is not of the robot that was \
-             measured, joints and readings do not belong together, or the readings scatter by as much{}",
+             measured, joints and readings do not belong together, the sensor was moved between rows of one `group`, or the readings \
+             scatter by as much{}",
             stuck(set)
         ),
         "no single change of units, signs or conventions of all rows explains it",

@@ -11,8 +11,8 @@ use crate::tables::names::Unit;
 /// One thing that may be wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Hypothesis {
-    /// Joint angles are in radians.
-    Radians,
+    /// Joint angles, read in the first unit, are in the second.
+    Angles(Unit, Unit),
     /// Those of one joint are.
     JointRadians(usize),
     /// A part of the readings is in a unit of so many mm.
@@ -105,7 +105,8 @@ pub fn still(set: &Dataset) -> Vec<usize> {
 /// All that may be wrong with a set of this kind.
 pub fn hypotheses(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
     let joints = set.joint_count();
-    let mut list = vec![Hypothesis::Radians, Hypothesis::StandardDh];
+    let mut list = vec![Hypothesis::StandardDh];
+    list.extend([(Unit::Deg, Unit::Rad), (Unit::Rad, Unit::Deg)].map(|(read, is)| Hypothesis::Angles(read, is)));
     // A touch reads no length.
     let touches = (0..set.poses.len()).any(|row| set.touches(row));
     if !touches && small_part(set).is_some() {
@@ -189,7 +190,9 @@ impl Hypothesis {
                     "joint {joint} is counted together with joint {before}{as_on}: the angle between its links is j{joint} {way} j{before}"
                 )
             }
-            Hypothesis::Radians => "the joint angles are in radians, not in degrees".to_owned(),
+            Hypothesis::Angles(read_as, unit) => {
+                format!("the joint angles are in {}, not in {}", unit.word(), read_as.word())
+            }
             Hypothesis::Lengths(_, read_as, unit) => {
                 format!("the readings are in {}, not in {}", unit.word(), read_as.word())
             }
@@ -267,7 +270,10 @@ impl Hypothesis {
         let (mut set, mut robot) = (set.clone(), robot.clone());
         match self {
             // Of joints that slide the numbers are no angles.
-            Hypothesis::Radians => (0..set.joint_count()).filter(|&j| !slides(j)).for_each(|j| in_degrees(&mut set, j)),
+            Hypothesis::Angles(read_as, unit) => {
+                let times = unit.converted(1.0) / read_as.converted(1.0);
+                (0..set.joint_count()).filter(|&j| !slides(j)).for_each(|j| turn(&mut set, j, times));
+            }
             Hypothesis::Lengths(factor, ..) => set.poses.iter_mut().for_each(|pose| scale(pose, factor)),
             Hypothesis::KnownLengths(factor, _) => {
                 for known in &mut set.known {
@@ -275,7 +281,7 @@ impl Hypothesis {
                     known.stated_sigma_mm = known.stated_sigma_mm.map(|mm| mm * factor);
                 }
             }
-            Hypothesis::JointRadians(i) => in_degrees(&mut set, i),
+            Hypothesis::JointRadians(i) => turn(&mut set, i, Unit::Rad.converted(1.0)),
             Hypothesis::Part(factor, _) => {
                 for row in small_part(&set).unwrap_or_default() {
                     scale(&mut set.poses[row], factor);
@@ -327,9 +333,9 @@ fn small_part(set: &Dataset) -> Option<Vec<usize>> {
     Some(rows)
 }
 
-/// A joint, its numbers taken for radians.
-fn in_degrees(set: &mut Dataset, joint: usize) {
-    set.poses.iter_mut().for_each(|pose| pose.joints_rad[joint] = pose.joints_rad[joint].to_degrees());
+/// A joint that turns so many times as far.
+fn turn(set: &mut Dataset, joint: usize, times: f64) {
+    set.poses.iter_mut().for_each(|pose| pose.joints_rad[joint] *= times);
 }
 
 fn scale(pose: &mut Pose, factor: f64) {

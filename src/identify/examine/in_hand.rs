@@ -14,7 +14,7 @@ use crate::robot::Robot;
 use crate::robot::tool_fit::Start;
 
 /// Fewest poses: nine unknowns are held against 24 numbers.
-const FEWEST: usize = 8;
+pub const FEWEST: usize = 8;
 
 /// Refuses points of cameras on the hand.
 pub fn refuse(set: &Dataset, robot: &Robot) -> Result<(), Error> {

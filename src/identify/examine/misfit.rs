@@ -42,7 +42,7 @@ const LIKELIER: f64 = TOLD_APART + 4.4;
 pub const ALIKE: f64 = 2.0;
 
 /// Rows that are enough to tell hypotheses apart.
-const ROWS: usize = 120;
+pub const ROWS: usize = 120;
 
 /// Rows of a placement: twice its own unknowns, below which it would take up what is wrong.
 const ROWS_A_GROUP: usize = 12;

@@ -8,7 +8,7 @@ pub mod covariances;
 mod hypothesis;
 pub mod in_hand;
 pub mod known;
-mod misfit;
+pub mod misfit;
 pub mod on_rows;
 pub mod orientations;
 pub mod robots;

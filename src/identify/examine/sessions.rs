@@ -14,6 +14,7 @@
 
 mod along;
 mod drift;
+mod placements;
 
 use std::ops::Range;
 use std::rc::Rc;
@@ -22,9 +23,12 @@ use nalgebra::DMatrix;
 
 pub use self::along::{Along, Session};
 use self::drift::{Drift, Moves};
+use self::placements::GROSS;
+pub use self::placements::{SHORTEST, split};
 use crate::difference::TOLD_APART;
-use crate::identify::data::dataset::{Dataset, Group};
+use crate::identify::data::dataset::Dataset;
 use crate::identify::data::shared;
+use crate::identify::examine::misfit::IMPLAUSIBLE_MM;
 use crate::identify::judge::recheck::zero;
 use crate::identify::residuals::distances::Origin;
 use crate::identify::residuals::eliminate::Block;
@@ -33,11 +37,7 @@ use crate::identify::solve::linearised::{Fresh, Placement};
 use crate::identify::solve::robust::{LEAST_FREEDOM, Loss};
 use crate::identify::solve::task::Task;
 use crate::linear_algebra::pseudo_inverse;
-use crate::measurements::Role;
 use crate::robot::Robot;
-
-/// Fewest fitted rows of a session: twice its own unknowns.
-pub const SHORTEST: usize = 8;
 
 /// Of touches of a socket.
 const SHORTEST_TOUCH: usize = 4;
@@ -45,10 +45,6 @@ const SHORTEST_TOUCH: usize = 4;
 /// A cut of points must explain this share of what is left, and this many times what a cut along any joint explains.
 const SHARE: f64 = 0.1;
 const BEATS: f64 = 1.3;
-
-/// Robust standard deviations from which on a row counts no more the farther it is off: a few that are off by metres
-/// would hide a step.
-const GROSS: f64 = 8.0;
 
 /// Most cuts; data that want more are no sessions.
 const MOST_CUTS: usize = 30;
@@ -62,10 +58,16 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
     let extras = shared::unknowns(set, settings);
     let (mut look, mut gross) = (Look::Uncapped, Vec::new());
     let mut drifts: Vec<Drift> = Vec::new();
-    for _ in 0..MOST_CUTS {
+    for round in 0..MOST_CUTS {
         let rows: Vec<usize> = cut.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
         let task = Task { extras: &extras, ..Task::plain(&cut, robot, &parameters, &rows, settings) };
         let Some(search) = Search::new(&task, look) else { break };
+        // A step that is not linear is looked for where links that are fitted leave more than any robot.
+        let of_step = (round == 0 && search.left_mm >= IMPLAUSIBLE_MM).then_some(search.left_mm);
+        if let Some(parted) = of_step.and_then(|left_mm| placements::parted(set, robot, settings, left_mm)) {
+            cut = parted;
+            continue;
+        }
         let found = search.best_cut(&along.drifting);
         for drift in search.drifts(found) {
             if !along.drifting.contains(&drift.group) {
@@ -90,11 +92,26 @@ pub fn find(set: &Dataset, robot: &Robot, settings: &Settings) -> (Dataset, Alon
         };
     }
     if cut.groups.len() > set.groups.len() {
-        along.sessions = list(&cut);
+        along.sessions = along::list(&cut);
+        if !drifts.is_empty() {
+            let rows: Vec<usize> = set.fit_rows().into_iter().filter(|row| !gross.contains(row)).collect();
+            let task = Task { extras: &extras, ..Task::plain(set, robot, &parameters, &rows, settings) };
+            without_steps(&mut drifts, &task, &cut);
+            along.drifting.retain(|group| drifts.iter().any(|drift| drift.group == *group));
+        }
     }
     along.instead = drift::of_joints(&drifts, robot, set.groups.len() > 1);
     along.step = drift::step(&drifts);
     (cut, along)
+}
+
+/// Leaves out those of groups of which placements that begin where they are cut explain clearly more than what moves
+/// evenly does; `whole` is the task of the rows before any cut.
+fn without_steps(drifts: &mut Vec<Drift>, whole: &Task, cut: &Dataset) {
+    let Some(search) = Search::new(whole, Look::Uncapped) else { return };
+    let steps = |placed: &Placed| search.steps(placed, cut) > search.evenly(placed) + TOLD_APART;
+    let of_steps: Vec<&String> = search.placed.iter().filter(|p| steps(p)).map(|p| search.name(p)).collect();
+    drifts.retain(|drift| !of_steps.contains(&&drift.group));
 }
 
 /// How a search looks at rows that are far off. Gross errors hide small steps, but rows are far off beside a large step
@@ -138,6 +155,8 @@ struct Search<'a> {
     placed: Vec<Placed>,
     /// Whether a row is so far off that it may be a gross error.
     is_doubtful: bool,
+    /// Scatter of a coordinate that the fit left, mm.
+    left_mm: f64,
     /// Numbers measured, how many of them the fit left, and the sum of their squares.
     numbers: f64,
     freedom: f64,
@@ -149,6 +168,7 @@ impl<'a> Search<'a> {
         let robust = task.robust(Loss::Absolute).ok()?.capped(if look == Look::Capped { GROSS } else { f64::INFINITY });
         let sigmas = task.settings.outlier_sigmas;
         let is_doubtful = sigmas > 0.0 && task.rows.iter().any(|&row| robust.scores[row] > sigmas);
+        let left_mm = robust.scatter.point_mm;
         let (rows, problem, prior) = robust.linearised();
         let parts: Vec<(&Block, &Placement, DMatrix<f64>)> = rows
             .blocks
@@ -201,7 +221,8 @@ impl<'a> Search<'a> {
                 Block::Pairwise(_) => {}
             }
         }
-        Some(Search { set: task.set, placed, is_doubtful, numbers: numbers as f64, freedom: freedom as f64, squares })
+        let (numbers, freedom) = (numbers as f64, freedom as f64);
+        Some(Search { set: task.set, placed, is_doubtful, left_mm, numbers, freedom, squares })
     }
 
     fn pays(&self, gain: f64, unknowns: usize) -> bool {
@@ -302,6 +323,28 @@ impl<'a> Search<'a> {
         Some((self.likelihood(gain, fresh.columns.ncols() + 1), moves))
     }
 
+    /// The likelihood of a placement, or of the zero of a joint, that moves evenly along the rows.
+    fn evenly(&self, placed: &Placed) -> f64 {
+        let order: Vec<usize> = (0..placed.rows.len()).collect();
+        let ramps = placed.causes().map(|(_, of)| self.likelihood(placed.ramp(of, &order).0, of.columns.ncols()));
+        ramps.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// The same of placements that begin where the rows are cut. Each row of a cut is an unknown more.
+    fn steps(&self, placed: &Placed, cut: &Dataset) -> f64 {
+        let group = |k: usize| cut.poses[placed.rows[k].0].group;
+        let begins = (1..placed.rows.len()).filter(|&k| group(k) != group(k - 1)).map(|k| placed.rows[k].1.start);
+        let begins: Vec<usize> = begins.collect();
+        let own = placed.fresh.columns.ncols();
+        let columns = DMatrix::from_fn(placed.fresh.columns.nrows(), own * begins.len(), |row, column| {
+            if row < begins[column / own] { 0.0 } else { placed.fresh.columns[(row, column % own)] }
+        });
+        let fresh = Fresh { columns, ..placed.fresh.clone() };
+        let mut products = fresh.nothing();
+        placed.rows.iter().for_each(|(_, at)| fresh.add(&mut products, at, 1.0));
+        self.likelihood(fresh.gain(&products), (own + 1) * begins.len())
+    }
+
     /// The group of a placement.
     fn name(&self, placed: &Placed) -> &String {
         &self.set.groups[self.set.poses[placed.rows[0].0].group].name
@@ -345,32 +388,6 @@ impl Placed {
         }
         (fresh.gain(&products), fresh.amounts(&products)[0])
     }
-}
-
-/// Starts a new group at `row`: it and all later rows of its group move there.
-pub(super) fn split(set: &mut Dataset, row: usize) {
-    let group = set.poses[row].group;
-    let name = set.groups[group].name.clone();
-    set.groups.push(Group { name, center: None });
-    let fresh = set.groups.len() - 1;
-    for pose in set.poses.iter_mut().skip(row).filter(|p| p.group == group) {
-        pose.group = fresh;
-    }
-}
-
-/// The sessions of the groups that were cut.
-fn list(set: &Dataset) -> Vec<Session> {
-    let session = |(g, group): (usize, &Group)| {
-        let rows = set.rows(|p| p.group == g && p.role != Role::Verify);
-        let name = |row: Option<&usize>| row.map(|&r| set.poses[r].name.clone());
-        let (first, last) = (name(rows.first())?, name(rows.last())?);
-        Some((rows[0], Session { group: group.name.clone(), first, last, count: rows.len() }))
-    };
-    let cut = |group: &Group| set.groups.iter().filter(|g| g.name == group.name).count() > 1;
-    let groups = set.groups.iter().enumerate().filter(|(_, group)| cut(group));
-    let mut sessions: Vec<(usize, Session)> = groups.filter_map(session).collect();
-    sessions.sort_by_key(|(row, _)| *row);
-    sessions.into_iter().map(|(_, s)| s).collect()
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use super::file::Record;
 use super::findings::{self, Findings};
 use super::parameters::MethodRecord;
 use super::quality::PointSpread;
-use super::{rounded, untested};
+use super::{plausible, rounded, untested};
 use crate::identify::data::dataset::{Dataset, Kind};
 use crate::identify::data::{still, unused};
 use crate::identify::examine::conventions;
@@ -80,6 +80,9 @@ impl Record {
         };
         self.is_beyond = self.advice == Advice::Check && findings.beyond.is_some();
         self.is_computed = computed.is_some();
+        if self.advice == Advice::DoNotUse {
+            self.of_catalogue = plausible::of_catalogue(set, nominal);
+        }
         self.warnings = findings.against.iter().chain(&far).map(Finding::sentence).collect();
         self.warnings.extend(worse);
         self.warnings.extend(kept.filter(|_| self.advice != Advice::DoNotUse));

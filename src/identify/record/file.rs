@@ -44,6 +44,9 @@ pub struct Record {
     /// Whether the points are no instrument's.
     #[serde(skip)]
     pub is_computed: bool,
+    /// Arms of the catalogue that are near the points, where the file's robot is not, with what they leave, mm.
+    #[serde(skip)]
+    pub of_catalogue: Vec<(&'static str, f64)>,
     /// In plain words, the gravest first.
     pub warnings: Vec<String>,
     /// Poses that fit far worse than the rest and were left out.

@@ -58,16 +58,17 @@ impl Findings {
         let rounded = rounded::of_joints(set, found);
         // What rounded angles leave is not the instrument's.
         let noise = of_noise(set, found).filter(|_| rounded.is_none());
-        let is_far = is_far(found);
+        let (is_far, other) = (is_far(found), plausible::of_another_robot(found));
         let beyond_all = || (is_far && noise.is_none()).then(|| conventions::unexplained(set, "the best fit", left_mm));
         let unexplained = unexplained.filter(|_| !is_plausible(found) && noise.is_none()).or_else(beyond_all);
+        let unexplained = unexplained.map(|finding| beside_far_links(finding, other.is_some() && !is_far));
         let is_reached = unexplained.is_none();
         let left_out = left_out_of_a_joint(set, found);
         let (of_rounding, rounded) = if is_reached { (None, rounded) } else { (rounded, None) };
         let many = many_left_out(set, found);
         // Whether readings or robot file are scaled, nobody knows: the robot that was found may be off by as much. Of
         // rows that nothing explains it says nothing.
-        let (scale, other) = (scale(set, found).filter(|_| is_reached), plausible::of_another_robot(found));
+        let scale = scale(set, found).filter(|_| is_reached);
         // A scale that explains all links is why they are far off, and no other robot.
         let (of_links, scale) = if other.is_some() { (scale.or(other), None) } else { (None, scale) };
         let against: Vec<Finding> =
@@ -86,7 +87,6 @@ impl Findings {
             .filter(|_| scale.is_none())
             .or_else(|| plausible::of_all_lengths(found))
             .filter(|_| against.is_empty());
-        let terms = plausible::of_terms(found);
         let many = many.filter(|many| against.iter().all(|told| told.rows != many.rows));
         let doubts = examined
             .into_iter()
@@ -97,7 +97,7 @@ impl Findings {
             .chain(misfits::of_verify(set, found))
             .chain(doubted)
             .chain(scale)
-            .chain(terms)
+            .chain(plausible::of_terms(found))
             .chain(far_beyond)
             .collect();
         Findings { against, beyond, doubts, notes }
@@ -108,6 +108,12 @@ impl Findings {
         let first = self.against.iter().chain(&self.beyond);
         first.chain(&self.doubts).chain(&self.notes).cloned().collect()
     }
+}
+
+/// What no links near the file's explain, where a search that goes farther ends with less.
+fn beside_far_links(finding: Finding, is_farther: bool) -> Finding {
+    let figures = "the figures of `after` are of links that were taken farther from the file's than robots are built";
+    if is_farther { Finding { action: format!("{}; {figures}", finding.action), ..finding } } else { finding }
 }
 
 /// Whether the robot that was found explains what no convention did, as where a link is so far off that only the whole

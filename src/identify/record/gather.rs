@@ -58,6 +58,7 @@ impl Record {
             reason: String::new(),
             is_beyond: false,
             is_computed: false,
+            of_catalogue: Vec::new(),
             warnings: Vec::new(),
             outliers: set.names(&found.outliers),
             strays: set.names(found.strays(set)),

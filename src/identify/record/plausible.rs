@@ -1,9 +1,16 @@
 //! Whether the parameters that were found are those of a built robot.
 
+use rayon::prelude::*;
+
 use crate::difference::TOLD_APART;
+use crate::identify::data::dataset::Dataset;
+use crate::identify::examine::in_hand::{FEWEST, most_points};
+use crate::identify::examine::misfit::{ALIKE, EXPLAINS};
 use crate::identify::finding::Finding;
 use crate::identify::model::base::NEGLIGIBLE;
 use crate::identify::run::Identification;
+use crate::robot::catalogue::{self, ARMS, Arm};
+use crate::robot::tool_fit::Start;
 use crate::robot::{Parameter, Robot, Unit};
 use crate::statistics::median;
 
@@ -16,6 +23,25 @@ pub fn of_another_robot(found: &Identification) -> Option<Finding> {
         ),
         "check that the robot file is the right one",
     ))
+}
+
+/// Arms of the catalogue that the points are near, the nearest first, where they are far from the file's robot: the
+/// sensor and the tool anywhere, middle errors in mm.
+pub fn of_catalogue(set: &Dataset, nominal: &Robot) -> Vec<(&'static str, f64)> {
+    let (joints, points) = most_points(set);
+    let fitted_mm = |robot: &Robot| Some(robot.fit_tool(&joints, &points, Start::Around)?.left_mm);
+    let Some(now_mm) = fitted_mm(nominal).filter(|_| points.len() >= FEWEST) else { return Vec::new() };
+    let slides = |robot: &Robot| robot.joints.iter().map(|joint| joint.slides).collect::<Vec<bool>>();
+    let left_mm = |arm: &Arm| {
+        let robot = catalogue::robot(arm.name).filter(|robot| slides(robot) == slides(nominal))?;
+        Some((arm.name, fitted_mm(&robot)?))
+    };
+    let mut arms: Vec<(&str, f64)> = ARMS.par_iter().filter_map(left_mm).collect();
+    arms.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let least_mm = arms.first().map_or(f64::INFINITY, |arm| arm.1);
+    // A built robot is off by no more than its links are, which another one is by times as much.
+    let is_near = least_mm < NOBODYS_MM && EXPLAINS * least_mm < now_mm;
+    arms.into_iter().filter(|arm| is_near && arm.1 < ALIKE * least_mm).collect()
 }
 
 /// Whether no link is farther from the file's than robots are built, be it known well or badly.
@@ -184,7 +210,8 @@ mod tests {
     use super::*;
     use crate::identify::examine::sessions::Along;
     use crate::identify::record::{Findings, Record};
-    use crate::identify::synthetic::{identified, planned, settings, to_first};
+    use crate::identify::synthetic::{self, identified, planned, settings, to_first};
+    use crate::measurements::Role;
     use crate::robot::Advice;
 
     /// What is said of a robot whose parameter is off by so much more than it is built to, mm or mrad.
@@ -233,6 +260,30 @@ mod tests {
     fn lengths_that_are_all_off_are_told_whether_one_is_known_or_not() {
         assert!([-0.5, 0.0, 0.5, 1.0].into_iter().all(|by_mm| !all_are_off(by_mm)));
         assert!([-40.0, -20.0, 20.0, 40.0].into_iter().all(all_are_off));
+    }
+
+    /// What the catalogue says of points of one arm beside the file of another.
+    #[test]
+    fn an_arm_of_the_catalogue_is_named_where_the_points_are_its_and_not_the_files() {
+        let (paper, ur5e, irb) =
+            (Robot::paper(), catalogue::robot("ur5e").unwrap(), catalogue::robot("abb-irb120").unwrap());
+        let said = |of: &Robot, by: &Robot| {
+            let mut real = of.clone();
+            real.tool_mm = nalgebra::Vector3::new(20.0, -40.0, 90.0);
+            real.joints.iter_mut().for_each(|joint| joint.a_mm += 0.3);
+            let row = |k: usize| {
+                let joints_rad = crate::robot::inverse::spread_start(of, k);
+                let joints_deg = joints_rad.iter().map(|angle| angle.to_degrees()).collect();
+                let seen = synthetic::seen_at(real.target_mm(&joints_rad));
+                synthetic::row(k.to_string(), "one", Role::Sample, joints_deg, seen)
+            };
+            let set = Dataset::new(&(0..40).map(row).collect::<Vec<_>>()).unwrap();
+            of_catalogue(&set, by).into_iter().map(|(name, _)| name).collect::<Vec<_>>()
+        };
+        assert_eq!(said(&irb, &ur5e), ["abb-irb120"]);
+        assert_eq!(said(&ur5e, &irb), ["ur5e"]);
+        assert_eq!(said(&irb, &irb), [""; 0]);
+        assert_eq!(said(&paper, &irb), [""; 0], "an arm that is not in the catalogue");
     }
 
     #[test]

@@ -108,7 +108,9 @@ impl<'a> Task<'a> {
             Prior::Evidence => base.rank().min(self.robot.joints.len() + 6),
         };
         if numbers <= least {
-            return Err(Error::TooFew { numbers, parameters: base.rank(), poses: self.rows.len() });
+            let of_pose = if self.set.kind == Kind::Positions || self.set.touches(self.rows[0]) { 3 } else { 1 };
+            let more = (least + 1 - numbers).div_ceil(of_pose);
+            return Err(Error::TooFew { numbers, parameters: base.rank(), poses: self.rows.len(), more });
         }
         Ok(())
     }

@@ -34,10 +34,9 @@ pub(in crate::measurements) fn lacking(parts: &[Part], picked: &Picked, count: u
     let sheets = parts.iter().find(|p| matches!(&p.grid.form, Form::Sheet(_, others) if *others > 0));
     let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
     let hint = format!(
-        "{}{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
-         `--columns j1,j2,...,-,x,y,z` names the columns{} in their order, `-` skips one",
+        "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
+         `--columns j1,j2,...,-,x,y,z` names the columns{} in their order, `-` skips one{touches}",
         lying(parts, count),
-        touches,
         side_by_side(parts)
     );
     parts[0].refuse(format!("{what}: {}", found.join("; ")), Some(&hint))
@@ -65,9 +64,9 @@ fn touches(parts: &[Part], count: usize) -> &'static str {
         false => p.free().len() == count,
     };
     if parts.iter().all(alone) {
-        "if the target was at one point in all rows of a file, a touch, one table of all with the columns \
+        "; if the target was at one point in all rows of a file, a touch, one table of all with the columns \
          `pose,group,role,j1_deg,...,distance_mm` says so: `distance_mm` 0, a `group` for each point, and \
-         `--known-distances FILE` for the distances between the points; else "
+         `--known-distances FILE` for the distances between the points"
     } else {
         ""
     }
@@ -107,19 +106,26 @@ pub(in crate::measurements) fn unplaced(parts: &[Part], picked: &Picked, forced:
     if !touches(parts, count).is_empty() {
         return lacking(parts, &Picked { joints: picked.joints.clone(), ..Picked::default() }, count);
     }
+    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
+        true => "the joints",
+        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
+        false => "the joints and which the point",
+    };
+    let lacking = if what == "the point" { "points" } else { "joint angles" };
+    let elsewhere = match parts.len() {
+        1 => {
+            format!("where the {lacking} stand in a file of their own, a second `--measurements FILE` names it; else ")
+        }
+        _ => String::new(),
+    };
     let hint = format!(
-        "{}see whether the file of `--robot` is of this robot; if it is, `--columns` names the {} columns{} in their order: j1 to j{count} for \
+        "{}{elsewhere}see whether the file of `--robot` is of this robot; if it is, `--columns` names the {} columns{} in their order: j1 to j{count} for \
          the joints, x, y, z for the point, `-` for each that is neither, and `--units deg,mm` (rad, m) their units: a column that is spoilt is \
          then looked for",
         lying(parts, count),
         parts.iter().map(Part::width_of_file).sum::<usize>(),
         side_by_side(parts)
     );
-    let what = match parts.iter().any(|p| p.names_any(|w| matches!(w, What::Coordinate(_) | What::Distance))) {
-        true => "the joints",
-        false if parts.iter().any(|p| p.names_any(|w| matches!(w, What::Joint(_)))) => "the point",
-        false => "the joints and which the point",
-    };
     // Joints that names say are not what is in question.
     let is_open = |p: &&Part| what != "the point" || !(p.is_program() || pick::names_joints(p, count));
     let message = format!("no name says which columns are {what}, {NOT_NEAR}");

@@ -10,6 +10,7 @@ use crate::identify::judge::uncertainty::Expected;
 use crate::identify::record::{Advice, PointSpread, Record};
 use crate::report::table::{Table, number};
 use crate::robot::Robot;
+use crate::robot::catalogue::PAPER;
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 
 /// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written,
@@ -45,7 +46,7 @@ pub fn summary(
     let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
     lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
     let of_links = identified.corrections.is_empty();
-    lines.push(format!("next: {}", next(record, robot.map_or("ROBOT", Utf8Path::as_str), (file.as_str(), of_links))));
+    lines.push(format!("next: {}", next(record, robot, (file.as_str(), of_links))));
     lines.join("\n") + "\n"
 }
 
@@ -66,8 +67,25 @@ pub(super) fn advice(record: &Record) -> String {
     }
 }
 
-/// What to do with the robot that was found in `file`, which may be one of links alone.
-fn next(record: &Record, robot: &str, (file, of_links): (&str, bool)) -> String {
+/// What to do with the robot that was found in `file`, which may be one of links alone. Without a file of the nominal
+/// robot it is that of the paper, of which a command writes one.
+fn next(record: &Record, robot: Option<&Utf8Path>, (file, of_links): (&str, bool)) -> String {
+    if let [(name, _), ..] = record.of_catalogue[..] {
+        return format!(
+            "the arm of the catalogue that the points are near is {}, its tool and the sensor solved: `stereocal robot new {name}`, and identify again \
+             with that file, if it is the arm",
+            arms(&record.of_catalogue)
+        );
+    }
+    let Some(robot) = robot else {
+        let named = "`--robot FILE` names the robot that was measured (`stereocal robot list` has arms by name)";
+        return match record.advice {
+            Advice::DoNotUse => format!("{named}: identify again with it"),
+            _ => format!(
+                "{named}; if it is that of Table 1 of the paper, `stereocal robot new {PAPER} --out .` writes its file"
+            ),
+        };
+    };
     match record.advice {
         Advice::Use => format!(
             "`stereocal compensate TARGETS --robot {robot} --identified {file}`, or {}",
@@ -87,9 +105,16 @@ fn next(record: &Record, robot: &str, (file, of_links): (&str, bool)) -> String 
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
         }
         Advice::DoNotUse => format!(
-            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the pendant"
+            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the \
+             pendant, `stereocal robot list` for other arms"
         ),
     }
+}
+
+/// Arms of the catalogue with what they leave.
+fn arms(list: &[(&str, f64)]) -> String {
+    let said: Vec<String> = list.iter().map(|(name, mm)| format!("{name} ({mm:.2} mm off in the middle)")).collect();
+    said.join(" or ")
 }
 
 /// How large a scale of the readings may hide; of a result that is not to be used there is nothing that it could be

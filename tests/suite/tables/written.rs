@@ -209,7 +209,8 @@ fn hints_count_the_columns_and_know_touches() {
     let folder = Folder(workplace());
     let (robot, rows) = world(30);
     let alone = |name: &str| folder.file(name, text("", &rows, ",", |q, _| q.iter().map(|v| v.to_radians()).collect()));
-    let touches = ["no columns of a measured point", "a touch", "`distance_mm` 0", "--known-distances"];
+    let second = "hint: another `--measurements FILE` joins the file that has them row by row";
+    let touches = ["no columns of a measured point", second, "a touch", "`distance_mm` 0", "--known-distances"];
     refused(&source(&[&alone("a.csv")]), &robot, &touches);
     refused(&source(&[&alone("a.csv"), &alone("b.csv")]), &robot, &touches);
     let other =
@@ -218,7 +219,10 @@ fn hints_count_the_columns_and_know_touches() {
     refused(
         &source(&[&none]),
         &robot,
-        &["of this robot; if it is, `--columns` names the 11 columns in their order: j1 to j6"],
+        &[
+            "hint: where the joint angles stand in a file of their own, a second `--measurements FILE` names it; else see",
+            "of this robot; if it is, `--columns` names the 11 columns in their order: j1 to j6",
+        ],
     );
     // What stands behind the columns that are named is not used.
     let more = |q: &[f64], p: &[f64; 3]| [joined(q, p), vec![q[0] / 7.0, p[0] / 3.0]].concat();

@@ -1,6 +1,6 @@
 use super::*;
 use crate::identify::synthetic::{World, planned, point};
-use crate::measurements::{Measurement, Observed};
+use crate::measurements::{Measurement, Observed, Role};
 use crate::tables::names::Unit;
 
 /// One sphere with tilts of so many degrees, by an arm that is off by what a good one is off.
@@ -205,6 +205,35 @@ fn a_unit_that_was_typed_is_named_with_the_one_that_it_would_have_to_be() {
             format!("the readings are in {}, not in {} as `--units {}` says (", is.word(), typed.word(), typed.flag());
         assert!(against[0].finding.starts_with(&named), "{against:?}");
     }
+}
+
+#[test]
+fn a_unit_of_angles_that_was_typed_is_named_with_the_flag_that_is_right() {
+    let (world, rows) = one_sphere(25.0, 5);
+    for (is, read_as, times) in [(Unit::Deg, Unit::Rad, 1f64.to_degrees()), (Unit::Rad, Unit::Deg, 1f64.to_radians())] {
+        for lengths in [None, Some(Unit::M)] {
+            let read = joints(&rows, |q| q.iter_mut().for_each(|angle| *angle *= times));
+            let mut set = Dataset::new(&read).unwrap();
+            (set.typed_angle, set.typed_unit) = (Some(read_as), lengths);
+            let Mended { findings, against, unexplained_mm, .. } = examine(&set, &world.nominal, &Settings::default());
+            assert!(findings.len() == 1 && against.is_empty() && unexplained_mm.is_none(), "{findings:?} {against:?}");
+            let (word, not, flag) = (is.word(), read_as.word(), read_as.flag());
+            let named = format!("the joint angles are in {word}, not in {not} as `--units {flag}` says (");
+            assert!(findings[0].finding.starts_with(&named), "{findings:?}");
+            let flags = if lengths.is_some() { format!("{},m", is.flag()) } else { is.flag().to_owned() };
+            assert!(findings[0].action.contains(&format!("`--units {flags}` says so")), "{findings:?}");
+        }
+    }
+}
+
+/// Nor is the robot file to blame.
+#[test]
+fn rows_of_placements_far_apart_are_of_no_other_convention() {
+    let world = planned(160, 0, 25.0, 0.02, 7, &|_| {});
+    let of = |block: &str| world.rows.iter().filter(|row| row.at.group == block).take(30).cloned().collect::<Vec<_>>();
+    let mut rows = [of("g0"), of("g2")].concat();
+    rows.iter_mut().for_each(|row| (row.at.group, row.at.role) = ("one".to_owned(), Role::Sample));
+    assert_eq!(said(&rows, &world.nominal), [""; 0]);
 }
 
 #[test]

@@ -2,7 +2,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::*;
 use crate::identify::synthetic;
-use crate::measurements::{Measurement, Observed};
+use crate::measurements::{Measurement, Observed, Role};
 
 /// Wire lengths to an anchor that moves by 5 mm after `moved` rows.
 fn wire(moved: usize) -> (synthetic::World, Vec<Measurement>) {
@@ -96,6 +96,22 @@ fn a_joint_that_creeps_is_told_from_a_sensor_that_drifts() {
             assert!(along.instead.is_none() && !along.drifting.is_empty(), "{seed} {by_mm}: {along:?}");
         }
         assert_eq!(creeping(None, 0.0, seed), Along::default());
+    }
+}
+
+/// Steps that all go one way are none.
+#[test]
+fn a_sensor_that_moves_in_steps_is_no_drift() {
+    for (by_mm, seed) in [(0.5, 1), (2.0, 2), (5.0, 3)] {
+        let mut world = synthetic::planned(240, 0, 25.0, 0.02, seed, &|_| {});
+        world.rows.retain(|row| row.at.group == "g1" && row.at.role == Role::Sample);
+        for (k, row) in world.rows.iter_mut().enumerate() {
+            *synthetic::point(row) += Vector3::new(0.5, -0.6, 0.6) * by_mm * (k / 15) as f64;
+        }
+        let (_, along) = find(&Dataset::new(&world.rows).unwrap(), &world.nominal, &Settings::default());
+        assert!(along.drifting.is_empty() && along.instead.is_none(), "{by_mm} mm: {along:?}");
+        let counts: Vec<usize> = along.sessions.iter().map(|session| session.count).collect();
+        assert_eq!(counts, [15; 4], "{by_mm} mm");
     }
 }
 

@@ -97,6 +97,11 @@ impl Rows {
         distances.into_iter().map(|distance| distance.unwrap_or(f64::INFINITY)).collect()
     }
 
+    /// The target's place with which they are least.
+    pub(in crate::identify::examine) fn tool_mm(&self, rounds: usize) -> Vector3<f64> {
+        self.distances(&self.pairs(&Hypothesis::NONE), self.tool_mm, true, rounds).1
+    }
+
     pub(super) fn count(&self) -> usize {
         self.points.len()
     }
