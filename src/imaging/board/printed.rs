@@ -68,10 +68,11 @@ impl PrintedExtent {
             Ok(printed) if scaled.square_mm > LARGER * assumed.square_mm => Ok(printed),
             Ok(_) if LARGER * scaled.square_mm < assumed.square_mm => {
                 let [across, along] = self.mm.map(|value| as_written_mm(10.0 * value));
+                let side = (scaled.square_mm * 1e3).round() / 1e3;
                 Err(format!(
-                    "a printed extent of {width} x {height} mm makes {}: if it was read in cm, it is `--measured-mm {across}x{along}`; if the squares are                      so small, say so as well: `--square-mm {}`",
-                    scaled.said(),
-                    (scaled.square_mm * 1e3).round() / 1e3
+                    "a printed extent of {width} x {height} mm makes {} of {side} mm: if it was read in cm, it is `--measured-mm {across}x{along}`; \
+                     if they are so small, say so as well: `--square-mm {side}`",
+                    scaled.unit()
                 ))
             }
             Err(_) if self.is_inner_of_any_size(assumed) => Err(format!(
@@ -238,7 +239,7 @@ mod tests {
         for (extent, why) in [
             (
                 "26.65x21",
-                "if it was read in cm, it is `--measured-mm 266.5x210`; if the squares are so small, say so as well: `--square-mm 2.98`",
+                "if it was read in cm, it is `--measured-mm 266.5x210`; if they are so small, say so as well: `--square-mm 2.978`",
             ),
             ("210x150", "span: measure from the outer edge of the first square"),
             ("150x210", "span: measure from the outer edge of the first square"),

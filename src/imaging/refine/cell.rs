@@ -9,9 +9,10 @@ use crate::imaging::coded::local_map;
 use crate::imaging::coded::marker::{mapped, square_map};
 use crate::imaging::lattice::Places;
 
-/// What a marker's outline reaches beyond it, blurs, and how far from where it should be it may be printed, px.
+/// What a marker's outline reaches beyond it, blurs, and how far from where it should be it may lie, px: it is drawn in
+/// whole pixels, and placed by corners of the reduced copy.
 const HALO_BLURS: f64 = 3.0;
-const HALO_PX: f64 = 1.0;
+const HALO_PX: f64 = 0.5;
 /// Least margin between an edge and a marker beside it in which the edge is seen by itself, px and in blurs.
 const LEAST_MARGIN_PX: f64 = 2.0;
 const LEAST_MARGIN_BLURS: f64 = 3.0;
