@@ -13,6 +13,8 @@ use crate::imaging::lattice::Places;
 /// whole pixels, and placed by corners of the reduced copy.
 const HALO_BLURS: f64 = 3.0;
 const HALO_PX: f64 = 0.5;
+/// How far from where they should be the next edges may lie, px.
+const NEXT_PX: f64 = 1.0;
 /// Least margin between an edge and a marker beside it in which the edge is seen by itself, px and in blurs.
 const LEAST_MARGIN_PX: f64 = 2.0;
 const LEAST_MARGIN_BLURS: f64 = 3.0;
@@ -153,13 +155,14 @@ impl Cell {
     /// themselves.
     pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
         let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);
-        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + self.beside_px()))
+        let halo_px = if self.dark.is_some() { 0.0 } else { HALO_PX };
+        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + halo_px))
     }
 
-    /// How far from where it should be what is beside the corner may be printed, px. A tag's bits are printed with its
+    /// How far from where they should be the next edges may lie, px. A tag's bits are printed with its
     /// edges, and its border is so narrow that a px of it is most of what a window leaves.
-    pub(super) fn beside_px(&self) -> f64 {
-        if self.dark.is_some() { 0.0 } else { HALO_PX }
+    pub(super) fn next_px(&self) -> f64 {
+        if self.dark.is_some() { 0.0 } else { NEXT_PX }
     }
 
     /// The markers beside the corner, larger by a halo, px.

@@ -280,7 +280,7 @@ fn half_px(edge_px: f64, margin_px: f64) -> f64 {
 
 /// How far a window stays off the next edges, px. Oblique edges come nearer to each other.
 fn margin_px(start: &Model, cell: &Cell) -> f64 {
-    (MARGIN_BLURS * start.blur_px[0].max(start.blur_px[1]) + cell.beside_px()) / cell.skew()
+    (MARGIN_BLURS * start.blur_px[0].max(start.blur_px[1]) + cell.next_px()) / cell.skew()
 }
 
 pub(super) fn near_half_px(start: &Model) -> f64 {
