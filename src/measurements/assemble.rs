@@ -302,7 +302,7 @@ impl Taken<'_> {
                 let at = At { part, column: *column };
                 let is_told = match file.kinds[*column] {
                     Kind::Numbers | Kind::Beyond => true,
-                    Kind::Words => parts_rows(file, *column),
+                    Kind::Words => file.parts_rows(*column),
                     _ => false,
                 };
                 is_told && !taken.contains(&at)
@@ -332,13 +332,4 @@ fn turns(file: &Part, column: usize) -> bool {
     let is_entry = file.meanings.as_ref().is_some_and(|meanings| matches!(meanings[column].what, What::Matrix(..)));
     let name = file.names.as_ref().and_then(|names| names.get(column));
     is_entry || name.is_some_and(|name| words(name).0.iter().any(|word| TURNS.contains(&word.as_str())))
-}
-
-/// Whether a column has a few words, each in several rows, as places and sessions have: it may be the group that the
-/// user means.
-fn parts_rows(file: &Part, column: usize) -> bool {
-    let mut words: Vec<&str> = file.rows.iter().map(|(_, row)| row[column].trim()).collect();
-    words.sort_unstable();
-    words.dedup();
-    (2..=file.rows.len() / 4).contains(&words.len())
 }

@@ -36,10 +36,9 @@ const EXTENSIONS: [&str; 8] = ["png", "jpg", "jpeg", "bmp", "tif", "tiff", "pgm"
 
 /// Reads the list; the sentence says what was taken of a table that is not in the contract's columns.
 pub fn read_pose_list(path: &Utf8Path) -> Result<(Vec<RobotPose>, Option<String>)> {
-    let is_joint = |name: &String| name.starts_with('j') && (name.ends_with("_deg") || name.ends_with("_mm"));
-    let is_own = |table: Table<'_>| table.column("pose").is_some() && table.header.iter().any(is_joint);
+    let is_own = |table: Table<'_>| table.column("pose").is_some() && table.header.iter().any(|name| is_joint(name));
     if !path.is_file() || Table::read(path, "list of poses", "").is_ok_and(is_own) {
-        return Ok((read_poses(path)?, None));
+        return Ok((read_poses(path)?, beside_own(path)));
     }
     let parts = [Part::read(path, JOINTS, false)?];
     let joints = joints(&parts)?;
@@ -82,17 +81,26 @@ pub fn read_pose_list(path: &Utf8Path) -> Result<(Vec<RobotPose>, Option<String>
     Ok((Table::new(path, header, rows)?.poses(None)?, Some(said)))
 }
 
+/// The columns beside those of the contract, in a list that has these.
+fn beside_own(path: &Utf8Path) -> Option<String> {
+    let part = Part::read(path, JOINTS, false).ok()?;
+    let own = |name: &str| ["pose", "group", "role", "target"].contains(&name) || is_joint(name);
+    let names = part.names.iter().flatten().enumerate();
+    let taken: Vec<usize> = names.filter(|(_, name)| own(name)).map(|(column, _)| column).collect();
+    let left = not_used(&part, &taken);
+    (!left.is_empty()).then(|| format!("{}: {}{left}", part.file_name(), count(part.rows.len(), "row")))
+}
+
+/// Whether a column is a joint's by the contract.
+fn is_joint(name: &str) -> bool {
+    name.starts_with('j') && (name.ends_with("_deg") || name.ends_with("_mm"))
+}
+
 /// The columns that are not taken, and what one that parts the rows may be for.
 fn not_used(part: &Part, taken: &[usize]) -> String {
     let left: Vec<usize> = (0..part.width()).filter(|column| !taken.contains(column)).collect();
     let name = |column: &usize| part.column_name(*column);
-    let parts_rows = |column: &usize| {
-        let values: BTreeSet<&str> = part.rows.iter().map(|(_, row)| row[*column].trim()).collect();
-        // A value of one row alone is none of a group.
-        (2..=part.rows.len() / 2).contains(&values.len())
-            && matches!(part.kinds[*column], Kind::Words | Kind::Counts | Kind::Numbers)
-    };
-    let group = left.iter().find(|column| parts_rows(column)).map_or(String::new(), |column| {
+    let group = left.iter().find(|column| part.parts_rows(**column)).map_or(String::new(), |column| {
         format!(" (call {} `group` if it says where the robot or the sensor stood)", name(column))
     });
     if left.is_empty() {
@@ -199,12 +207,17 @@ mod tests {
 
     #[test]
     fn a_column_that_parts_the_rows_is_named() {
-        let text = "Name;Gruppe;A1;A2;A3;A4\na;1;1,5;20;3;4\nb;1;2,5;30;3,5;4\nc;2;9;11;40;-5\nd;2;90;45;-8;4,5\n";
-        let (_, said) = read("poses.csv", text).unwrap();
-        let told = "pose = Name; not used: Gruppe (call Gruppe `group` if it says where the robot or the sensor stood)";
-        assert!(said.as_ref().is_some_and(|said| said.ends_with(told)), "{said:?}");
-        let (poses, said) = read("poses.csv", &text.replace("Gruppe", "group")).unwrap();
-        assert!(poses[3].group == "2" && said.is_some_and(|said| said.ends_with("pose = Name")), "{poses:?}");
+        let row = |k: usize| format!("p{k};{};{};{};{};-{k}\n", k / 4, 10 * k, 90 - 7 * k, k * k);
+        let rows: String = (0..8).map(row).collect();
+        let told = "not used: Gruppe (call Gruppe `group` if it says where the robot or the sensor stood)";
+        for (heads, own) in [("A1;A2;A3;A4", "pose = Name"), ("j1_deg;j2_deg;j3_deg;j4_deg", "8 rows")] {
+            let text = format!("{};Gruppe;{heads}\n{rows}", if own == "8 rows" { "pose" } else { "Name" });
+            let text = if own == "8 rows" { text.replace(';', ",") } else { text };
+            let (_, said) = read("poses.csv", &text).unwrap();
+            assert!(said.as_ref().is_some_and(|said| said.ends_with(&format!("{own}; {told}"))), "{said:?}");
+            let (poses, said) = read("poses.csv", &text.replace("Gruppe", "group")).unwrap();
+            assert!(poses[7].group == "1" && said.is_none_or(|said| said.ends_with(own)), "{poses:?}");
+        }
     }
 
     #[test]

@@ -155,14 +155,18 @@ impl Cell {
     /// themselves.
     pub(super) fn hidden(&self, blur_px: f64) -> Option<[Option<Quad>; 2]> {
         let is_clear = self.margin_px() >= LEAST_MARGIN_PX.max(LEAST_MARGIN_BLURS * blur_px);
-        let halo_px = if self.dark.is_some() { 0.0 } else { HALO_PX };
-        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + halo_px))
+        is_clear.then(|| self.hidden_by(HALO_BLURS * blur_px + self.unless_in_tag(HALO_PX)))
     }
 
-    /// How far from where they should be the next edges may lie, px. A tag's bits are printed with its
-    /// edges, and its border is so narrow that a px of it is most of what a window leaves.
+    /// How far from where they should be the next edges may lie, px.
     pub(super) fn next_px(&self) -> f64 {
-        if self.dark.is_some() { 0.0 } else { NEXT_PX }
+        self.unless_in_tag(NEXT_PX)
+    }
+
+    /// A tag's bits are printed with its edges, and its border is so narrow that a px of it is most of what a window
+    /// leaves: there nothing is left out for what may lie elsewhere.
+    fn unless_in_tag(&self, px: f64) -> f64 {
+        if self.dark.is_some() { 0.0 } else { px }
     }
 
     /// The markers beside the corner, larger by a halo, px.

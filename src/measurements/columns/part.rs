@@ -173,6 +173,15 @@ impl Part {
         })
     }
 
+    /// Whether a column has a few values, each in several rows, as places and sessions have: it may be the group that
+    /// the user means.
+    pub fn parts_rows(&self, column: usize) -> bool {
+        let mut values: Vec<&str> = self.rows.iter().map(|(_, row)| row[column].trim()).collect();
+        values.sort_unstable();
+        values.dedup();
+        (2..=self.rows.len() / 4).contains(&values.len())
+    }
+
     /// A column as a message calls it.
     pub fn column_name(&self, column: usize) -> String {
         let name = self.names.as_ref().and_then(|names| names.get(column)).filter(|name| !name.is_empty());

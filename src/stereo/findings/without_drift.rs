@@ -4,8 +4,7 @@
 //! corners, each moved by what the drift did to it since that moment. Without this the drift would count as scatter of
 //! the pairs, although it is known, and the rig's covariance would be several times too large. The corners of the
 //! result are those that were seen, and the boards lie as the rig sees them: neither residuals nor what is held out are
-//! smoothed by the finding. Goes wrong: pairs that are chosen
-//! otherwise without the drift; then there is no result.
+//! smoothed by the finding. Goes wrong: pairs that are chosen otherwise without the drift; then there is no result.
 
 use nalgebra::{Point2, Vector2};
 

@@ -29,8 +29,8 @@ pub(super) fn held_out_lengths(case: &Case) -> Evidence {
         "measure the board's own lengths more finely, and give that: `--board-uncertainty-mm`, or `--measured-mm` with more digits"
     } else {
         beyond_others(case).unwrap_or(
-            "look at the worst pair in camera-check.html, and move both of its pictures away where they show why; where all are alike: a flat board on a stand, both cameras triggered at once, \
-             or the `--tolerance-mm` that your robot needs",
+            "look at the worst pair in camera-check.html, and move both of its pictures away where they show why; where all are alike: \
+             a flat board on a stand, both cameras triggered at once, or the `--tolerance-mm` that your robot needs",
         )
     };
     let detail = format!(
