@@ -64,6 +64,7 @@ mod tests {
             likeliest: Vec::new(),
             placements: Vec::new(),
             effect_mm: 0.0,
+            of_robot_mm: 0.0,
             seen_mm: at_most_mm,
             at_most_mm,
             instead: Vec::new(),

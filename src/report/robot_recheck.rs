@@ -48,10 +48,13 @@ fn sentence(recheck: &Recheck, judged: Judged, mm: fn(f64) -> String) -> String 
         false => {
             // A cause by itself is said of the base; the table has what another placement does not take up of it.
             let base = if recheck.changed && !recheck.likeliest.is_empty() { " in the robot's base" } else { "" };
-            format!(
-                "{statement}; the target is off by up to {} mm{base}, tolerance {tolerance} mm",
-                mm(recheck.effect_mm)
-            )
+            match recheck.changed {
+                true => format!(
+                    "{statement}; the robot's change moves the target by up to {} mm{base}, tolerance {tolerance} mm",
+                    mm(recheck.of_robot_mm)
+                ),
+                false => format!("{statement}; tolerance {tolerance} mm"),
+            }
         }
     };
     recheck.of_strays().map_or(of_rest.clone(), |strays| format!("{strays}; without: {of_rest}"))

@@ -31,12 +31,13 @@ pub struct Examined {
 pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(&str)) -> Examined {
     step("units, signs and conventions");
     let (mut set, mut robot, mut findings, mut against) = (set.clone(), robot.clone(), Vec::new(), Vec::new());
-    let (mut unexplained_mm, mut mended) = (None, Vec::new());
+    let (mut unexplained_mm, mut mended, mut is_open) = (None, Vec::new(), false);
     let of_targets = set.targets.as_ref().map_or_else(Vec::new, |targets| targets.findings.clone());
     if settings.examine {
         let (of_rows, open, of_orientations, of_known);
         (set, of_rows) = shifted::examine(&set, &robot);
-        Mended { set, robot, findings, against, open, unexplained_mm } = conventions::examine(&set, &robot, settings);
+        Mended { set, robot, findings, against, open, unexplained_mm, is_open } =
+            conventions::examine(&set, &robot, settings);
         findings.splice(0..0, of_rows);
         mended.clone_from(&findings);
         (set, of_orientations) = orientations::examine(&set, &robot, settings.model == Some(Model::Pose));
@@ -53,6 +54,10 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
         Some(robots) => (robots.parted(&uncut), Along { robots: Some(robots.finding()), ..Along::default() }),
         None => sessions::find(&uncut, &robot, settings),
     };
+    if is_open && !along.sessions.is_empty() {
+        (set, robot, unexplained_mm) =
+            within_sessions(set, robot, settings, unexplained_mm, &mut mended, &mut findings);
+    }
     if settings.examine && !along.sessions.is_empty() && along.drifting.is_empty() {
         along.instead = robots::tools::of_sessions(&uncut, &set, &robot);
     }
@@ -79,4 +84,23 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     let of_links = |left_mm| conventions::unexplained(&set, "the best fit of links near the file's", left_mm);
     let unexplained = unexplained_mm.filter(|_| robots.is_none()).map(of_links);
     Examined { set, robot, along, findings, mended, against, unexplained }
+}
+
+/// A sensor that was moved hides a column that is wrong, too: what no change of all rows explains is looked at once more
+/// in sessions with placements of their own. The rows, the robot, and what is not explained then.
+fn within_sessions(
+    set: Dataset,
+    robot: Robot,
+    settings: &Settings,
+    unexplained_mm: Option<f64>,
+    mended: &mut Vec<Finding>,
+    findings: &mut Vec<Finding>,
+) -> (Dataset, Robot, Option<f64>) {
+    let again = conventions::examine(&set, &robot, settings);
+    if again.is_open || !again.against.is_empty() {
+        return (set, robot, unexplained_mm);
+    }
+    mended.extend(again.findings.iter().cloned());
+    findings.extend(again.findings);
+    (again.set, again.robot, None)
 }

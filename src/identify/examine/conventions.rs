@@ -47,6 +47,8 @@ pub struct Mended {
     pub open: Option<Finding>,
     /// Errors that no hypothesis explains, mm a coordinate, where they are more than a built robot's.
     pub unexplained_mm: Option<f64>,
+    /// Whether that, or what is left where the rows fall into sessions, is more than a built robot's.
+    pub is_open: bool,
 }
 
 /// Looks for what is wrong with the conventions of a set and of a robot's file, and mends it.
@@ -54,7 +56,7 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
     let (mut set, mut robot, mut findings, mut against) = (set.clone(), robot.clone(), Vec::new(), Vec::new());
     let mut in_other_units = false;
     let Some(mut left) = Misfit::of(&set, &robot, settings, None) else {
-        return Mended { set, robot, findings, against, open: None, unexplained_mm: None };
+        return Mended { set, robot, findings, against, open: None, unexplained_mm: None, is_open: false };
     };
     let (mut cut, mut open) = (None, None);
     for _ in 0..FAULTS {
@@ -107,7 +109,8 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings) -> Mended {
                 format!("what is left is implausible all the same, so that the cause may be another one; {done}");
         }
     }
-    Mended { set, robot, findings, against, open, unexplained_mm }
+    let is_open = cut.or(unexplained_mm).is_some_and(|left_mm| left_mm >= IMPLAUSIBLE_MM);
+    Mended { set, robot, findings, against, open, unexplained_mm, is_open }
 }
 
 /// Adds several faults at once that explain the errors, in the place of what does not.
@@ -249,7 +252,8 @@ pub fn unexplained(set: &Dataset, fit: &str, left_mm: f64) -> Finding {
              scatter by as much{}",
             stuck(set)
         ),
-        "no single change of units, signs or conventions of all rows explains it",
+        "no single change of units, signs or conventions of all rows explains it; two at once, or one beside a sensor that was moved without a `group` that says \
+         so, are not all looked for",
     )
 }
 

@@ -1,6 +1,8 @@
 //! What may be wrong with the units and conventions of a data set or of a robot's file, one fault at a time, and how
 //! both are without it.
 
+mod words;
+
 use nalgebra::{Rotation3, Vector3};
 
 use crate::identify::data::dataset::{Dataset, Kind, Pose, Reading};
@@ -15,6 +17,10 @@ pub enum Hypothesis {
     Angles(Unit, Unit),
     /// Those of one joint are.
     JointRadians(usize),
+    /// The way of a joint that slides is in a unit of so many mm.
+    Slide(usize, f64, &'static str),
+    /// One coordinate of the points is in a unit of so many mm.
+    Coordinate(usize, f64, &'static str),
     /// A part of the readings is in a unit of so many mm.
     Part(f64, &'static str),
     /// A joint's reading holds so many times that of the joint before it.
@@ -94,6 +100,12 @@ impl Counting {
     }
 }
 
+/// Units in which lengths are written where they are not in mm.
+const OTHER_UNITS: [(f64, &str); 3] = [(1000.0, "m"), (25.4, "inches"), (10.0, "cm")];
+
+/// How far no joint turns from its least to its largest reading, rad: two turns.
+const FARTHEST_WAY: f64 = 4.0 * std::f64::consts::PI;
+
 /// Sine of a twist whose sign matters: a smaller one is an error of manufacture.
 const LEAST_TWIST: f64 = 0.1;
 
@@ -106,11 +118,16 @@ pub fn still(set: &Dataset) -> Vec<usize> {
 pub fn hypotheses(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
     let joints = set.joint_count();
     let mut list = vec![Hypothesis::StandardDh];
-    list.extend([(Unit::Deg, Unit::Rad), (Unit::Rad, Unit::Deg)].map(|(read, is)| Hypothesis::Angles(read, is)));
+    list.push(Hypothesis::Angles(Unit::Deg, Unit::Rad));
+    // Of a robot that hardly moves touches agree and distances are alike, whoever's they are: angles that no joint reaches
+    // are a proof that they were read as radians and are degrees, and nothing else is.
+    if (0..joints).any(|joint| !set.is_sliding(joint) && way(set, joint) > FARTHEST_WAY) {
+        list.push(Hypothesis::Angles(Unit::Rad, Unit::Deg));
+    }
     // A touch reads no length.
     let touches = (0..set.poses.len()).any(|row| set.touches(row));
     if !touches && small_part(set).is_some() {
-        list.extend([(1000.0, "m"), (25.4, "inches"), (10.0, "cm")].map(|(mm, unit)| Hypothesis::Part(mm, unit)));
+        list.extend(OTHER_UNITS.map(|(mm, unit)| Hypothesis::Part(mm, unit)));
     }
     let read_as = set.typed_unit.unwrap_or(Unit::Mm);
     for unit in [Unit::M, Unit::Inch, Unit::Cm, Unit::Um, Unit::Mm].into_iter().filter(|unit| *unit != read_as) {
@@ -122,11 +139,16 @@ pub fn hypotheses(set: &Dataset, robot: &Robot) -> Vec<Hypothesis> {
     }
     if set.kind == Kind::Positions {
         list.push(Hypothesis::Mirrored);
+        let of_axis = |axis| OTHER_UNITS.map(|(mm, unit)| Hypothesis::Coordinate(axis, mm, unit));
+        list.extend((0..3).flat_map(of_axis));
     }
     let still = still(set);
     let turns = |i: usize| !still.contains(&i) && !set.is_sliding(i);
     for i in 0..joints {
         list.push(Hypothesis::Negated(i));
+        if set.is_sliding(i) && way(set, i) > 0.0 {
+            list.extend(OTHER_UNITS.map(|(mm, unit)| Hypothesis::Slide(i, mm, unit)));
+        }
         list.extend((i + 1..joints).map(|j| Hypothesis::Exchanged(i, j)));
         // Radians that were taken for degrees move the joint by a fraction of its way.
         if !set.is_sliding(i) && way(set, i).to_degrees() > STILL {
@@ -163,7 +185,10 @@ impl Hypothesis {
     /// target little is the target's.
     pub fn of_one_joint(self) -> Option<usize> {
         match self {
-            Hypothesis::JointRadians(i) | Hypothesis::Negated(i) | Hypothesis::Lagging(Some(i), _) => Some(i),
+            Hypothesis::JointRadians(i)
+            | Hypothesis::Slide(i, ..)
+            | Hypothesis::Negated(i)
+            | Hypothesis::Lagging(Some(i), _) => Some(i),
             _ => None,
         }
     }
@@ -171,97 +196,6 @@ impl Hypothesis {
     /// The rows that it is about, where it is not about all.
     pub fn rows(self, set: &Dataset) -> Vec<usize> {
         if let Hypothesis::Part(..) = self { small_part(set).unwrap_or_default() } else { Vec::new() }
-    }
-
-    /// In words.
-    pub fn name(self) -> String {
-        match self {
-            Hypothesis::JointRadians(i) => {
-                format!("the angles of joint {} are in radians, those of the others in degrees", i + 1)
-            }
-            Hypothesis::Part(_, unit) => format!("a part of the readings is in {unit}, the others are in mm"),
-            Hypothesis::Coupled(i, times) => {
-                let (joint, before) = (i + 1, i);
-                let (way, as_on) = match times < 0.0 {
-                    true => ("+", " (as Fanuc counts joint 3, from the horizontal)"),
-                    false => ("-", ""),
-                };
-                format!(
-                    "joint {joint} is counted together with joint {before}{as_on}: the angle between its links is j{joint} {way} j{before}"
-                )
-            }
-            Hypothesis::Angles(read_as, unit) => {
-                format!("the joint angles are in {}, not in {}", unit.word(), read_as.word())
-            }
-            Hypothesis::Lengths(_, read_as, unit) => {
-                format!("the readings are in {}, not in {}", unit.word(), read_as.word())
-            }
-            Hypothesis::KnownLengths(_, unit) => format!("the known distances are in {unit}, not in mm"),
-            Hypothesis::Exchanged(i, j) => {
-                format!("the columns of joints {} and {} are exchanged (swapped)", i + 1, j + 1)
-            }
-            Hypothesis::Negated(i) => {
-                format!("joint {} is counted the other way round: its sign is flipped (negated)", i + 1)
-            }
-            Hypothesis::Offset(i, deg) => format!("joint {} is offset by {deg:.0} deg", i + 1),
-            Hypothesis::Twisted(i) => format!("`alpha_deg` of joint {} has the wrong sign", i + 1),
-            Hypothesis::Lagging(None, by) => format!("the joints lag {by} row against the readings"),
-            Hypothesis::Lagging(Some(i), by) => format!("joint {} lags {by} row against the others", i + 1),
-            Hypothesis::StandardDh => "the robot file holds standard DH parameters, not modified ones (MDH)".to_owned(),
-            Hypothesis::Counted(counting) => {
-                let coupled = counting.coupled.map(|(i, times)| Hypothesis::Coupled(i, times).name());
-                counting.signs().into_iter().chain(coupled).collect::<Vec<_>>().join(", and ")
-            }
-            Hypothesis::Mirrored => "the coordinates are mirrored: a left-handed frame".to_owned(),
-        }
-    }
-
-    /// Whether readings of the joints, in other files too, mean something else than the robot file says.
-    pub fn is_of_counting(self) -> bool {
-        use Hypothesis::{Counted, Coupled, Exchanged, Negated, Offset, StandardDh, Twisted};
-        matches!(self, Counted(_) | Coupled(..) | Exchanged(..) | Negated(_) | Offset(..) | StandardDh | Twisted(_))
-    }
-
-    /// What is to be mended, and where. A controller that counts its joints in its own way is a matter of the robot
-    /// file; a table that was written otherwise than the controller counts is one of the table.
-    pub fn mend(self) -> String {
-        match self {
-            Hypothesis::Negated(i) => {
-                format!(
-                    "the `sign` of joint {} in the robot file where the controller counts so, else the table",
-                    i + 1
-                )
-            }
-            Hypothesis::Offset(i, deg) => format!(
-                "`theta_deg` of joint {} in the robot file, by {deg:+.0}, where the controller counts so, else the table",
-                i + 1
-            ),
-            Hypothesis::Twisted(i) => format!("`alpha_deg` of joint {} in the robot file", i + 1),
-            // A robot file has no word for it.
-            Hypothesis::Coupled(i, times) => {
-                let ([joint, before], [there, back]) = ([i + 1, i], if times < 0.0 { ['+', '-'] } else { ['-', '+'] });
-                format!(
-                    "the table: joint {joint} as j{joint} {there} j{before}, in targets too, and j{joint} {back} j{before} in what `compensate` writes"
-                )
-            }
-            Hypothesis::Counted(counting) => {
-                let signs = counting.signs().map(|_| {
-                    format!(
-                        "the `sign` of joints {} in the robot file where the controller counts so, else the table",
-                        counting.numbers()
-                    )
-                });
-                let coupled = counting.coupled.map(|(i, times)| Hypothesis::Coupled(i, times).mend());
-                signs.into_iter().chain(coupled).collect::<Vec<_>>().join("; and ")
-            }
-            Hypothesis::StandardDh => "the robot file: `robot import TABLE --dh classic` reads such rows".to_owned(),
-            Hypothesis::Mirrored => {
-                "the table, of which x is negated here and in what is placed: whether x, y or z has the wrong sign, or two \
-                 of them are exchanged, the readings do not tell"
-                    .to_owned()
-            }
-            _ => "the table".to_owned(),
-        }
     }
 
     /// The set and the robot as they are if it holds.
@@ -282,6 +216,10 @@ impl Hypothesis {
                 }
             }
             Hypothesis::JointRadians(i) => turn(&mut set, i, Unit::Rad.converted(1.0)),
+            Hypothesis::Slide(i, factor, _) => turn(&mut set, i, factor),
+            Hypothesis::Coordinate(axis, factor, _) => {
+                set.poses.iter_mut().for_each(|pose| stretch(pose, axis, factor));
+            }
             Hypothesis::Part(factor, _) => {
                 for row in small_part(&set).unwrap_or_default() {
                     scale(&mut set.poses[row], factor);
@@ -336,6 +274,17 @@ fn small_part(set: &Dataset) -> Option<Vec<usize>> {
 /// A joint that turns so many times as far.
 fn turn(set: &mut Dataset, joint: usize, times: f64) {
     set.poses.iter_mut().for_each(|pose| pose.joints_rad[joint] *= times);
+}
+
+/// One coordinate of a point, with its variance and covariances, so many times as large.
+fn stretch(pose: &mut Pose, axis: usize, factor: f64) {
+    if let Reading::Position { point_mm, covariance_mm2, .. } = &mut pose.reading {
+        point_mm[axis] *= factor;
+        if let Some(c) = covariance_mm2 {
+            (0..3).for_each(|k| c[(axis, k)] *= factor);
+            (0..3).for_each(|k| c[(k, axis)] *= factor);
+        }
+    }
 }
 
 fn scale(pose: &mut Pose, factor: f64) {

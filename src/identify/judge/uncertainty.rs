@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector, Matrix3};
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::rigid_columns;
-use crate::identify::data::dataset::{Dataset, Pose};
+use crate::identify::data::dataset::{Dataset, Kind, Pose};
 use crate::identify::data::still::by_pose;
 use crate::identify::judge::lengths::{Length, Lengths, MEAN_OVER_RMS};
 use crate::identify::model::kinematics::Kinematics;
@@ -41,7 +41,7 @@ impl Covariance {
     }
 }
 
-/// The position error to expect of the identified robot, after one rigid fit to each placement.
+/// The position error to expect of the identified robot, after one rigid fit to each placement, or of distances to all.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Expected {
     /// Mean over the poses of the expected length of the error, mm.
@@ -98,16 +98,23 @@ impl Expected {
         let fresh = Matrix3::identity() * (scatter_mm2 + smooth_mm2);
         let mut of_robots = vec![Matrix3::zeros(); places.len()];
         let mut of_errors = of_robots.clone();
-        for group in 0..set.groups.len() {
+        // Distances and touches are of one robot in one base, wherever the points are that they are taken of: what moves
+        // all touches of a socket alike is an error of the robot all the same.
+        let placements = match set.kind {
+            Kind::Positions => (0..set.groups.len()).map(Some).collect(),
+            _ => vec![None],
+        };
+        for group in placements {
+            let is_placed = |pose: &Pose| group.is_none_or(|group| pose.group == group);
             let motion = |i: usize| rigid_columns(&places[i].point_mm.coords);
             let mut normal = DMatrix::zeros(count + 6, count + 6);
-            for i in set.of_group(fitted, group) {
+            for &i in fitted.iter().filter(|&&row| is_placed(&set.poses[row])) {
                 let mut columns = places[i].point_columns.clone().resize_horizontally(count + 6, 0.0);
                 columns.fixed_columns_mut::<6>(count).copy_from(&motion(i));
                 normal += columns.tr_mul(&columns);
             }
             let Eliminated { follow, inverse, .. } = Eliminated::new(&normal, count);
-            for i in set.rows(|pose| pose.group == group) {
+            for i in set.rows(is_placed) {
                 let columns = &places[i].point_columns - motion(i) * &follow;
                 let of_robot = &columns * &covariance * columns.transpose() * times[i];
                 // The placement itself is found through the scatter of the rows it is fitted to.

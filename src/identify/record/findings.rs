@@ -169,7 +169,9 @@ fn of_noise(set: &Dataset, found: &Identification) -> Option<Finding> {
     let is_explained = SMALL * scatter_mm < spread_mm(set, &found.fitted);
     // A joint that turned while its column stood still scatters the points as well, by more than an instrument does.
     let is_stuck = !constant_joints(set, &[]).is_empty() && is_far(found);
-    (is_explained && !is_stuck && pattern::is_scatter(formulation, set) && plausible::are_of_the_file(found)).then(|| {
+    // Terms that no gear has follow the joints in the place of what is wrong.
+    let is_built = || plausible::are_of_the_file(found) && plausible::of_terms(found).is_none();
+    (is_explained && !is_stuck && pattern::is_scatter(formulation, set) && is_built()).then(|| {
         Finding::new(
             format!("the readings scatter by {scatter_mm:.2} mm a coordinate, whatever the joints are{}", stuck(set)),
             "if the instrument is better than that, see whether the robot stood still and joints and readings are of one moment",

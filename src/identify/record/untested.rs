@@ -57,7 +57,8 @@ pub fn joints(set: &Dataset, found: &Identification) -> (Vec<Finding>, Vec<Findi
                 ),
                 "compare that column (its unit, its sign, its rows) with the controller, and the file's tool with the real one",
             ));
-        } else {
+        } else if found.scatter.point_mm < conventions::IMPLAUSIBLE_MM {
+            // A fit that leaves more than a robot may tells nothing of where the target is.
             unknown.push(Finding::new(
                 format!(
                     "joint {number} moves the target by {found_mm:.2} mm a coordinate only: unit, sign and zero of its column are not tested"

@@ -62,6 +62,7 @@ pub fn identify(
     let by_points = if set.kind == Kind::Positions { Model::Position } else { model };
     let (terms, judged, gross) = session.model(model, by_points)?;
     let fitted_terms = if terms == Terms::NOMINAL { Terms::default() } else { terms };
+    let gross = session.take_back_near(gross, by_points, &fitted_terms)?;
     if matches!(model, Model::Position | Model::Pose) {
         session.smooth = session.smooth_error(by_points, &fitted_terms)?;
     }

@@ -59,6 +59,20 @@ impl Session<'_> {
         self.name_outliers(model, terms, &|robust| robust.still_gross(gross.outliers.clone(), sigmas))
     }
 
+    /// Takes back the rows that a fit without them finds as near as the others. Where distances are alike, or a robot of
+    /// another size does as well, a robust fit may end at one that follows most rows, and the whole fit follows all.
+    pub(super) fn take_back_near(&mut self, gross: Gross, model: Model, terms: &Terms) -> Result<Gross, Error> {
+        if gross.outliers.is_empty() {
+            return Ok(gross);
+        }
+        let parameters = terms.parameters(self.robot);
+        let robust = self.task(&parameters, model).robust(Loss::Biweight)?;
+        let outliers = robust.not_near(&gross.outliers, self.settings.outlier_sigmas);
+        self.rows = self.set.fit_rows();
+        self.rows.retain(|row| !outliers.contains(row));
+        Ok(Gross { outliers, ..gross })
+    }
+
     /// Leaves out the rows that are `gross` errors of a robust fit, and names them; and others that are far off.
     fn name_outliers(
         &mut self,

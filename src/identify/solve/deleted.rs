@@ -152,6 +152,11 @@ impl Robust<'_> {
         far
     }
 
+    /// Of rows that were left out of this fit those that it does not find near enough to go back.
+    pub fn not_near(&self, out: &[usize], sigmas: f64) -> Vec<usize> {
+        self.far_off(out, READMITTED_WITHIN * sigmas)
+    }
+
     /// All rows of the data set against what the others predict for them, of those that are not in the fit nothing; and
     /// the known distances of the data set against what everything else says of them, in their own standard deviations.
     pub fn deleted(&self) -> (Vec<Deleted>, Vec<f64>) {

@@ -215,7 +215,7 @@ impl Formulation {
 
     /// That of all parameters and extras, parameters that are `held` taken as they are.
     pub fn offsets_covariance(&self, held: &dyn Fn(Parameter) -> bool) -> DMatrix<f64> {
-        if !self.held || !self.scale_seen {
+        if !self.held {
             let (spread, extras) = (self.spread(), self.rows.extras.len());
             let (rows, columns) = spread.shape();
             let mut spread = spread.resize(rows + extras, columns + extras, 0.0);

@@ -78,12 +78,12 @@ impl Comparison<'_> {
         let (seen_mm, at_most_mm) = (most(|c| c.seen_mm), most(|c| c.at_most_mm));
         // Cameras that are said to stand as before do not take up what the robot is off.
         let in_base_mm = explained.iter().map(|(.., off)| moves.in_base_mm(&off.columns, &off.amounts));
-        let effect_mm = match (changed, explained.is_empty()) {
+        let of_robot_mm = match (changed, explained.is_empty()) {
             (true, false) => in_base_mm.fold(0.0, f64::max),
             (true, true) => compared.misfit_mm(),
             (false, _) => 0.0,
         };
-        let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(effect_mm, f64::max);
+        let effect_mm = placements.iter().filter(|p| p.moved).map(|p| p.shift_mm).fold(of_robot_mm, f64::max);
         let likelihood = explained.first().map(|(likelihood, ..)| *likelihood);
         let (poses, by_cameras) = (self.set.names(used), self.set.is_of_cameras());
         let (columns, amounts) = self.before.corrected();
@@ -97,6 +97,7 @@ impl Comparison<'_> {
             likeliest,
             placements,
             effect_mm,
+            of_robot_mm,
             seen_mm,
             at_most_mm,
             instead,

@@ -88,8 +88,10 @@ pub struct Recheck {
     pub likeliest: Vec<(String, String)>,
     /// Placements that are in the old file.
     pub placements: Vec<Moved>,
-    /// By how much the change moves the target, in the base, mm.
+    /// By how much the change moves the target, in the base, or a placement that moved does, mm.
     pub effect_mm: f64,
+    /// What of that is the robot's own, mm.
+    pub of_robot_mm: f64,
     /// The largest movement of the target that a single cause could make without being seen, mm.
     pub seen_mm: f64,
     /// The largest movement of the target by a single cause that the poses leave room for, mm.

@@ -51,7 +51,13 @@ pub(super) fn larger(comparison: &Comparison, used: &[usize], whole: &Said) -> O
          shows beyond that: a noisier instrument, rounded joint angles, or play"
     );
     let likeliest = vec![(SCATTER.to_owned(), words)];
-    (!said.changed).then_some(Recheck { changed: true, likeliest, effect_mm: whole.recheck.effect_mm, ..said })
+    (!said.changed).then_some(Recheck {
+        changed: true,
+        likeliest,
+        effect_mm: whole.recheck.effect_mm,
+        of_robot_mm: whole.recheck.of_robot_mm,
+        ..said
+    })
 }
 
 /// How many times as far as they are known to the residuals scatter beside all changes, and the degrees of freedom that
