@@ -80,6 +80,22 @@ pub fn count(n: usize, noun: &str) -> String {
     format!("{n} {noun}{}", if n == 1 { "" } else { "s" })
 }
 
+/// Letters that are wrong, missing or too many in a word, where it is most likely the other: at most one in three, as
+/// more make another word.
+pub fn slips(typed: &str, word: &str) -> Option<usize> {
+    let [typed, word] = [typed, word].map(|w| w.trim_start_matches('-').chars().collect::<Vec<char>>());
+    let mut before: Vec<usize> = (0..=word.len()).collect();
+    for (i, a) in typed.iter().enumerate() {
+        let mut row = vec![i + 1];
+        for (j, b) in word.iter().enumerate() {
+            row.push((before[j] + usize::from(a != b)).min(before[j + 1] + 1).min(row[j] + 1));
+        }
+        before = row;
+    }
+    let longest = typed.len().max(word.len());
+    Some(before[word.len()]).filter(|&wrong| wrong < longest && wrong <= (longest / 3).max(1))
+}
+
 /// A sentence with its first letter as a capital.
 pub fn capital(sentence: &str) -> String {
     let mut chars = sentence.chars();

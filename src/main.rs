@@ -7,6 +7,7 @@ use clap::{CommandFactory, Parser};
 use stereocal::cli::{Cli, unexpected};
 use stereocal::commands::{self, Outcome};
 use stereocal::diagnostic::{Explain, report};
+use stereocal::progress;
 
 /// Bad usage, as clap and the contract have it; also a result that could not be printed.
 const BAD_USAGE: u8 = 2;
@@ -30,9 +31,12 @@ fn main() -> ExitCode {
         Ok(Outcome { stdout, status }) => {
             #[expect(clippy::disallowed_methods, reason = "the one place that writes to stdout")]
             let mut out = std::io::stdout().lock();
-            printed(out.write_all(stdout.as_bytes()).and_then(|()| out.flush()), status.code())
+            let printed = printed(out.write_all(stdout.as_bytes()).and_then(|()| out.flush()), status.code());
+            progress::say_held();
+            printed
         }
         Err(error) => {
+            progress::say_held();
             let _ = write!(std::io::stderr().lock(), "{}", report(&error));
             ExitCode::from(error.status().code())
         }

@@ -19,6 +19,7 @@ const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 static QUIET: AtomicBool = AtomicBool::new(false);
 static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+static HELD: Mutex<Option<Vec<String>>> = Mutex::new(None);
 
 /// No bars and no notes from now on.
 pub fn be_quiet() {
@@ -121,22 +122,36 @@ impl Drop for Step {
 
 /// A line on stderr that says what was done or left out.
 pub fn note(message: impl AsRef<str>) {
-    if !QUIET.load(Ordering::Relaxed) {
-        once(message.as_ref().to_owned());
+    if !QUIET.load(Ordering::Relaxed) && is_new(message.as_ref()) {
+        line(message.as_ref());
     }
 }
 
 /// A line on stderr that asks for attention.
 pub fn warn(message: impl AsRef<str>) {
-    once(format!("warning: {}", message.as_ref()));
+    if is_new(message.as_ref()) {
+        let warning = format!("warning: {}", message.as_ref());
+        match HELD.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            Some(held) => held.push(warning),
+            None => line(&warning),
+        }
+    }
 }
 
-fn once(message: String) {
-    let mut said = SAID.lock().unwrap_or_else(PoisonError::into_inner);
-    if !said.contains(&message) {
-        line(&message);
-        said.insert(message);
-    }
+/// Holds warnings back from now on: the result comes first, or the error that they led to comes last.
+pub fn hold_warnings() {
+    HELD.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_default();
+}
+
+/// Says the warnings that were held back, and others at once.
+pub fn say_held() {
+    let held = HELD.lock().unwrap_or_else(PoisonError::into_inner).take();
+    held.iter().flatten().for_each(|warning| line(warning));
+}
+
+/// Whether nothing has said it yet: what was a note is no warning afterwards.
+fn is_new(message: &str) -> bool {
+    SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(message.to_owned())
 }
 
 /// One write a line, so that lines of several threads don't mix.

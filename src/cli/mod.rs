@@ -84,9 +84,7 @@ pub enum Command {
     /// Undistort and rectify pairs of pictures, for eyes and for dense stereo
     Rectify(Rectify),
     /// Simulate pictures and measurements with known true values
-    #[command(
-        after_help = "It draws two checkerboards: the check board of 20x20 squares of 10 mm, and the target of 7x6 squares of 10 mm."
-    )]
+    #[command(after_help = "Example: stereocal simulate --board checker:9x6:25 --out world")]
     Simulate(Simulate),
     /// Choose the poses that determine the robot best, as poses.csv and robot programs
     #[command(after_help = "Example: stereocal plan --robot robot.toml --poses 40 --verify 10")]

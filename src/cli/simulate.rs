@@ -4,6 +4,8 @@ use camino::Utf8PathBuf;
 use clap::{Args, ValueEnum};
 
 use super::values::{between, whole, whole_between};
+use crate::formats::boards::files::named;
+use crate::imaging::Board;
 use crate::simulate::settings::Orientation;
 
 /// `stereocal simulate`
@@ -21,6 +23,12 @@ pub struct Simulate {
     /// How the flange is turned along a group's poses [default: the preset's]
     #[arg(long, value_enum)]
     pub orientation: Option<Orientation>,
+    /// The check board by its name, as for `camera-check --board`; key `check_board` [default: checker:20x20:10]
+    #[arg(long, value_name = "BOARD", value_parser = named)]
+    pub board: Option<Board>,
+    /// The target by its name; key `target_board` [default: checker:7x6:10]
+    #[arg(long, value_name = "BOARD", value_parser = named)]
+    pub target_board: Option<Board>,
     /// Pairs of pictures of the check board [default: the preset's]
     #[arg(long, value_name = "N", value_parser = whole_between::<usize>(0, 10_000))]
     pub check_pairs: Option<usize>,

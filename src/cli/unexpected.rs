@@ -3,6 +3,8 @@
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command};
 
+use crate::diagnostic::slips;
+
 /// Names of values that are files or folders.
 const PLACES: [&str; 2] = ["FILE", "DIR"];
 
@@ -13,7 +15,8 @@ const PICTURES: [&str; 5] = [".png", ".jpg", ".jpeg", ".tif", ".bmp"];
 const WITHOUT_FLAG: [&str; 8] = ["images", "pictures", "poses", "measurements", "table", "targets", "program", "file"];
 
 /// Words for a flag that share none with its name.
-const OTHER_WORDS: [(&str, &str); 7] = [
+const OTHER_WORDS: [(&str, &str); 8] = [
+    ("squares", "board"),
     ("data", "measurements"),
     ("table", "measurements"),
     ("points", "measurements"),
@@ -46,7 +49,7 @@ pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap
             Some(ContextValue::Strings(words)) => words,
             _ => continue,
         };
-        let near: Vec<String> = near.into_iter().filter(|word| is_slip(&typed, word)).collect();
+        let near: Vec<String> = near.into_iter().filter(|word| slips(&typed, word).is_some()).collect();
         match &near[..] {
             [] => {}
             [one] => _ = error.insert(tip, ContextValue::String(one.clone())),
@@ -66,20 +69,6 @@ pub fn mended(root: &Command, words: &[String], mut error: clap::Error) -> (clap
     }
     let hint = hint(&built, command, &error);
     (error, hint)
-}
-
-/// Whether one word is the other with few letters wrong, missing or too many: one in three, as those make another word.
-fn is_slip(typed: &str, word: &str) -> bool {
-    let [typed, word] = [typed, word].map(|w| w.trim_start_matches('-').chars().collect::<Vec<char>>());
-    let mut before: Vec<usize> = (0..=word.len()).collect();
-    for (i, a) in typed.iter().enumerate() {
-        let mut row = vec![i + 1];
-        for (j, b) in word.iter().enumerate() {
-            row.push((before[j] + usize::from(a != b)).min(before[j + 1] + 1).min(row[j] + 1));
-        }
-        before = row;
-    }
-    before[word.len()] <= (typed.len().max(word.len()) / 3).max(1)
 }
 
 fn hint(root: &Command, command: &Command, error: &clap::Error) -> Option<String> {

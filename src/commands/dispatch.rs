@@ -17,6 +17,7 @@ pub fn run(cli: Cli) -> Result<Outcome> {
     if cli.quiet {
         progress::be_quiet();
     }
+    progress::hold_warnings();
     start_threads(cli.threads)?;
     let settings = Config::file(cli.config.as_deref());
     let config = Config::load(cli.config.as_deref())?;

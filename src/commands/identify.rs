@@ -5,7 +5,6 @@ use camino::{Utf8Path, Utf8PathBuf};
 use super::{Outcome, Result};
 use crate::cli::{Identify, TableFlags};
 use crate::config::Config;
-use crate::diagnostic::count;
 use crate::files::OutDir;
 use crate::files::provenance::{Digested, Provenance, Run};
 use crate::formats::placements::record::{PLACEMENT, PlacementFile};
@@ -105,8 +104,8 @@ fn search(
     Ok((identify(set, nominal, settings, seed, &step)?, None))
 }
 
-/// The gravest warnings on the terminal; the page and the JSON have all. What stands below, in the verdict or beside
-/// the method, is not said before it, unless that goes elsewhere.
+/// The gravest warnings on the terminal; the page and the JSON have all. What the verdict says or stands beside the
+/// method is not said again, unless that goes elsewhere.
 fn said(record: &Record, out: &OutDir, is_json: bool) {
     const MOST: usize = 5;
     for (k, warning) in record.warnings.iter().take(MOST).enumerate() {
@@ -117,8 +116,7 @@ fn said(record: &Record, out: &OutDir, is_json: bool) {
         }
     }
     if record.warnings.len() > MOST {
-        let more = count(record.warnings.len() - MOST, "more warning");
-        progress::note(format!("{more} in {}", out.join("identify.html")));
+        progress::warn(format!("{} more in {}", record.warnings.len() - MOST, out.join("identify.html")));
     }
 }
 

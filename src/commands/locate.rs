@@ -54,7 +54,7 @@ pub fn run(args: &Locate, config: &Config, run: Run) -> Result<Outcome> {
         examine::examine(&set, &robot, &config.identify, &|_| {});
     // The robot is that of its file: what is wrong between the two is mended in the rows.
     let set = examine::on_rows::mended(&set, &robot, &of_rows).unwrap_or(set);
-    let moved = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along));
+    let moved = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along, &set));
     let said = against.iter().chain(&findings).chain(&unexplained).cloned().chain(moved);
     said.for_each(|finding| progress::warn(finding.sentence()));
     let mut doubts: Vec<String> =

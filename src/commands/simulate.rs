@@ -51,15 +51,15 @@ pub fn run(args: &Simulate, config: &Config, run: Run) -> Result<Outcome> {
     Ok(Outcome { stdout: summary(args, &world, &out), status: Status::Done })
 }
 
-/// The preset with what was typed in place of its values. The boards are those of the settings file.
+/// The preset with what was typed in place of its values. Boards that were not typed are those of the settings file.
 fn settings(args: &Simulate, config: &Config) -> Result<Settings> {
     let mut s = match args.preset {
         Preset::Paper => Settings::paper(),
         Preset::Small => Settings::small(),
     };
     s.seed = args.seed;
-    s.check_board = config.check_board.board(None, None, None)?;
-    s.target_board = config.target_board.board(None, None, None)?;
+    s.check_board = config.check_board.board(args.board, None, None)?;
+    s.target_board = config.target_board.board(args.target_board, None, None)?;
     s.optics = optics(args.lens_blur, s.optics);
     replace(&mut s.size_px, args.size);
     replace(&mut s.orientation, args.orientation);

@@ -10,6 +10,25 @@ pub fn decimal_comma(line: &str) -> Option<String> {
     is_comma.then(|| format!("`{value}` has a comma where a point is needed: {whole}.{decimals}"))
 }
 
+/// The line of a byte of the text, counted from 1.
+pub fn line_at(text: &str, at: usize) -> u64 {
+    1 + text[..at.min(text.len())].matches('\n').count() as u64
+}
+
+/// The line in which a key of TOML stands first that is refused at `second`: that in which another name in its place
+/// lets the reader come beyond that. The reader does not say it, and keys of other tables have the same names.
+pub fn first_of_key(text: &str, key: &str, second: usize) -> Option<u64> {
+    let refused_at = |text: &str| text.parse::<toml::Table>().err().and_then(|e| e.span()).map(|span| span.start);
+    if refused_at(text) != Some(second) {
+        return None;
+    }
+    let first = text[..second].match_indices(key).map(|(at, _)| at).find(|&at| {
+        let renamed = format!("{}{key}{}", &text[..at], &text[at..]);
+        refused_at(&renamed).is_none_or(|at| at > second + key.len())
+    })?;
+    Some(line_at(text, first))
+}
+
 /// A message of the readers of JSON and TOML in the words of the file's format, as their own name types of the source;
 /// without the place, which is said apart.
 pub fn plain(message: &str) -> String {
@@ -81,6 +100,20 @@ mod tests {
             ("key with no value, expected `=`", "key with no value, expected `=`"),
         ] {
             assert_eq!(plain(message), said);
+        }
+    }
+
+    #[test]
+    fn the_first_line_of_a_key_is_told_whatever_stands_in_other_tables() {
+        for (text, key, first) in [
+            ("a = 1\n[t]\na = \"a\"\nb = 2\n'a' = 3\n", "'a'", None),
+            ("a = 1\n[t]\na = \"a\"\nb = 2\na = 3\n", "a", Some(3)),
+            ("[t]\nx = [\n1, 2]\n[s]\nx = 1\n[t]\n", "t", Some(1)),
+            ("[[j]]\nx = 1\n[[j]]\nx = 1\ny = 2\nx = 3\nx = 4\n", "x", Some(4)),
+            ("[[j]]\nx = 1\n[[j]]\nx = = 1\n", "x", None),
+        ] {
+            let second = text.parse::<toml::Table>().unwrap_err().span().unwrap().start;
+            assert_eq!(first_of_key(text, key, second), first, "{text}");
         }
     }
 

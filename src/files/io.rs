@@ -7,8 +7,9 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::error::Category;
 
-use super::fault::{decimal_comma, plain};
+use super::fault::{decimal_comma, first_of_key, line_at, plain};
 use super::kind::kind;
+use super::missing::meant;
 use crate::diagnostic::{Explain, Place};
 
 /// Result of reading or writing a file.
@@ -81,7 +82,8 @@ impl Explain for Error {
     }
     fn hint(&self) -> Option<String> {
         match self {
-            Error::Missing { hint, .. } | Error::Format { hint, .. } => hint.clone(),
+            Error::Missing { path, hint, .. } => meant(path, hint.clone()),
+            Error::Format { hint, .. } => hint.clone(),
             Error::Io { action, source, path } if source.kind() == std::io::ErrorKind::PermissionDenied => {
                 Some(match *action {
                     "read" => format!("its owner can let you read it: `chmod -R u+rX {path}`"),
@@ -117,9 +119,7 @@ pub fn read_text_bytes(path: &Utf8Path, what: &'static str, hint: Option<&str>) 
         }
         Ok(_) => Ok(bytes),
         Err(source) if source.kind() == std::io::ErrorKind::NotFound => {
-            let hints: Vec<String> = found_elsewhere(path).into_iter().chain(hint.map(str::to_owned)).collect();
-            let hint = (!hints.is_empty()).then(|| hints.join(" "));
-            Err(Error::Missing { what, path: path.to_owned(), hint })
+            Err(Error::Missing { what, path: path.to_owned(), hint: hint.map(str::to_owned) })
         }
         Err(source) => Err(unreadable(path, what, source)),
     }
@@ -157,12 +157,6 @@ pub fn unreadable(path: &Utf8Path, what: &'static str, source: std::io::Error) -
     Error::format(path, None, format!("{what}: this is a folder, and a file is needed"), Some(&hint))
 }
 
-/// A file of this name in the folder that results go to unless another is named.
-fn found_elsewhere(path: &Utf8Path) -> Option<String> {
-    let there = Utf8Path::new("out").join(path.file_name()?);
-    (there != path && there.is_file()).then(|| format!("there is {there}: is it meant?"))
-}
-
 pub fn read_json<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint: Option<&str>) -> Result<T> {
     let text = read_text(path, what, hint)?;
     let is_json = text.trim_start().starts_with(['{', '[']);
@@ -192,11 +186,13 @@ pub fn read_toml<T: DeserializeOwned>(path: &Utf8Path, what: &'static str, hint:
         if let Some(other @ "a table") = kind(&text) {
             return Error::format(path, None, format!("{what}: this is {other}, and TOML is needed"), hint);
         }
-        let line = e.span().map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count() as u64);
+        let line = e.span().map(|span| line_at(&text, span.start));
         // Some messages do not say which key it is.
         let key = e.span().and_then(|span| text.get(span)).filter(|key| !key.is_empty() && key.len() < 40);
         let key = key.filter(|key| !e.message().contains(['`', '"']) && !key.contains('\n'));
-        let key = key.map_or(String::new(), |key| format!(": `{key}`"));
+        let first = key.zip(e.span()).and_then(|(key, span)| first_of_key(&text, key, span.start));
+        let first = first.map_or(String::new(), |first| format!(", which stands in line {first} already"));
+        let key = key.map_or(String::new(), |key| format!(": `{key}`{first}"));
         if let Some(fault) = line.and_then(|line| decimal_comma(text.lines().nth(line as usize - 1)?)) {
             return Error::format(path, line, format!("{what}: {fault}"), None);
         }

@@ -164,13 +164,16 @@ impl Explain for Error {
             Error::Files(e) => e.hint(),
             Error::Board(e) => e.hint(),
             Error::NotAFolder { path } if let Some(hint) = of_video(path) => Some(hint),
-            Error::NoFolder { .. } | Error::NotAFolder { .. } => Some(
-                "a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names"
-                    .to_owned(),
+            Error::NoFolder { path } | Error::NotAFolder { path } => crate::files::meant(
+                path,
+                Some("a folder of pairs holds left/ and right/ with equal names, or left*/right*, *_left/*_right, *_L/*_R names".to_owned()),
             ),
-            Error::NotRight { path, .. } => Some(format!(
-                "a second folder is that of the right camera's pictures; other places are named by their flags, results by `--out {path}`"
-            )),
+            Error::NotRight { path, .. } => crate::files::meant(
+                path,
+                Some(format!(
+                    "a second folder is that of the right camera's pictures; other places are named by their flags, results by `--out {path}`"
+                )),
+            ),
             Error::Unpaired { hint, .. } => Some(hint.clone()),
             Error::NoHalves { way: (extent, flag), .. } => {
                 Some(format!("`{flag}` is for pictures that hold both views, one as {extent} as the other"))

@@ -47,6 +47,8 @@ pub struct Rows {
 /// How well a set of poses determines the robot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Accuracy {
+    /// Number of parameters.
+    pub parameters: usize,
     /// Number of independent parameters that are determined.
     pub rank: usize,
     /// Largest over smallest singular value.
@@ -186,6 +188,7 @@ impl Problem {
         let base = Base::new(&all, RANK_TOLERANCE);
         let names: Vec<String> = self.parameters.iter().map(|p| p.name()).collect();
         Accuracy {
+            parameters: count,
             rank: base.rank(),
             condition: base.condition(),
             observability: base.observability(poses.len()),

@@ -136,11 +136,11 @@ fn assumed(placements: &[Placement], earlier: &[Candidate], settings: &Settings,
     match rows {
         _ if settings.first.is_some() || names.is_empty() => None,
         None => Some(
-            "where the cameras stand is only assumed: place them where plan.html has them, or `--first` and then `--after` find out"
+            "where the cameras stand is only assumed: place them as the table of plan.html says, or `--first` and then `--after` find out"
                 .to_owned(),
         ),
         Some(rows) => Some(format!(
-            "where the cameras stand in {} is only assumed, as {rows} has no three poses there: place them where plan.html has them, or measure three \
+            "where the cameras stand in {} is only assumed, as {rows} has no three poses there: place them as the table of plan.html says, or measure three \
              poses in each and plan with these, too",
             names.join(", ")
         )),

@@ -6,9 +6,10 @@ use nalgebra::{Point3, Vector3};
 use super::drawing::figure::Plot;
 use super::table::{Table, number, short};
 use super::{Result, page};
-use crate::diagnostic::{count, two_digits};
+use crate::diagnostic::{capital, count, two_digits};
 use crate::formats::plan::{Determined, Expected, PlanFile};
 use crate::measurements::Role;
+use crate::plan::predict::Accuracy;
 use crate::plan::scene::{Placement, Scene};
 use crate::plan::{COLLISIONS, Plan};
 use crate::robot::Robot;
@@ -27,8 +28,9 @@ pub fn summary(record: &PlanFile) -> String {
     let of = |d: &Determined| {
         let o = d.accuracy.observability.as_ref();
         format!(
-            "{} parameters determined (rank), condition {}, observability O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
+            "{} of {} parameters determined (rank), condition {}, observability O1 {}, O2 {}, O3 {}, O4 {}, O5 {}",
             d.accuracy.rank,
+            d.accuracy.parameters,
             number(d.accuracy.condition, 0),
             number(o.map(|o| o.o1), 2),
             number(o.map(|o| o.o2), 5),
@@ -42,9 +44,7 @@ pub fn summary(record: &PlanFile) -> String {
         Some(paper) => text += &format!("the paper's: {}\n", of(paper)),
         None => text += "the paper's plan is left out: this robot does not reach its poses before these cameras\n",
     }
-    if !record.plan.accuracy.zero.is_empty() {
-        text += &format!("not determined: {}\n", record.plan.accuracy.zero.join(", "));
-    }
+    undetermined(&record.plan.accuracy).iter().for_each(|said| text += &format!("{said}\n"));
     text += &format!(
         "error of the target over the spheres through the parameters alone (root mean square, {:.4} mm noise a coordinate); what `identify` expects \
          holds the robot's own scatter and the rig's own error, too:\n{table}",
@@ -53,9 +53,18 @@ pub fn summary(record: &PlanFile) -> String {
     text
 }
 
+/// The parameters that are not determined, as many as the rank lacks.
+fn undetermined(Accuracy { parameters, rank, zero, dependent, .. }: &Accuracy) -> Vec<String> {
+    let none = (!zero.is_empty()).then(|| format!("not determined: {}", zero.join(", ")));
+    let others = parameters - rank - zero.len();
+    let sums = (others > 0).then(|| format!("{others} only in sums: {}", dependent.join("; ")));
+    none.into_iter().chain(sums).collect()
+}
+
 pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Result<String> {
     let rows = record.plan.expected.iter().map(|e| [e.poses.to_string(), two_digits(e.rms_mm)]);
     let others: Vec<String> = record.warnings.iter().filter(|warning| *warning != COLLISIONS).cloned().collect();
+    let accuracy = &record.plan.accuracy;
     let content = html! {
         (page::verdict(page::Tone::Doubtful, "Collisions are not checked", &numbers(record, plan),
             "Neither the arm with itself, nor with the cameras or the cell. Run the program slowly, hand on the stop."))
@@ -64,7 +73,8 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
         (page::table(&["samples", "error, mm"], rows))
         p { "Root mean square of the target's position error that the identified parameters will leave over the spheres, tilts to 25 degrees, after one rigid fit; "
             (two_digits(record.noise_mm)) " mm noise a coordinate. The robot's own scatter (repeatability, and what the model lacks) comes on top: what "
-            code { "identify" } " expects holds both, and its page tells them apart. Rank " (record.plan.accuracy.rank) ", condition " (number(record.plan.accuracy.condition, 0)) "." }
+            code { "identify" } " expects holds both, and its page tells them apart. Rank " (accuracy.rank) " of " (accuracy.parameters) ", condition " (number(accuracy.condition, 0)) "." }
+        @for said in undetermined(accuracy) { p { (capital(&said)) "." } }
         (curve(record)?)
         (map(plan)?)
         h2 { "Where the cameras stand" }
@@ -73,7 +83,7 @@ pub fn page(scene: &Scene, robot: &Robot, plan: &Plan, record: &PlanFile) -> Res
             &["group", "left camera x, mm", "y, mm", "z, mm", "looks along x", "y", "z", "middle of the sphere x, mm", "y, mm", "z, mm"],
             plan.placements.iter().map(standing),
         ))
-        h2 { "Where the target goes" }
+        h2 { "Where the target goes, and the cameras stand" }
         div.side { @for figure in sides(robot, plan)? { (figure) } }
         h2 { "What the cameras will see" }
         div.side { @for figure in pictures(scene, plan)? { (figure) } }
@@ -154,9 +164,11 @@ fn sides(robot: &Robot, plan: &Plan) -> Result<Vec<maud::Markup>> {
                 plot = plot.points(label, points);
             }
         }
+        let cameras: Vec<_> =
+            plan.placements.iter().map(|p| flat(p.left_from_base.inverse().translation.vector)).collect();
         Ok(page::figure(
-            &plot.svg()?,
-            "The target's mark point in the base frame: what lies outside of these spheres is extrapolated.",
+            &plot.points("left camera", cameras).svg()?,
+            "The target's mark point and the left camera of each group in the base frame: what lies outside of these spheres is extrapolated.",
         ))
     };
     [("From above", 0, 1), ("From the front", 1, 2), ("From the side", 0, 2)].into_iter().map(figure).collect()

@@ -303,6 +303,20 @@ fn results(folder: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
+fn simulated_boards_are_those_that_were_named() {
+    let folder = workplace();
+    let boards = ["--board", "checker:9x6:25", "--target-board", "charuco:5x4:16:12:DICT_4X4_50"];
+    let few = ["--size", "640", "--check-pairs", "6", "--samples", "8", "--verify", "0", "--out", "."];
+    let made = stereocal(folder.path(), &[&["simulate"], &boards[..], &few].concat());
+    assert_eq!(made.status.code(), Some(0), "{}", stderr(&made));
+    let check = ["camera-check", "check", "--board", "checker:9x6:25", "--tolerance-mm", "1"];
+    let checked = stereocal(folder.path(), &check);
+    assert!(stdout(&checked).contains("6 of 6 pairs used"), "{}{}", stdout(&checked), stderr(&checked));
+    let measured = stereocal(folder.path(), &["measure", "poses", "--board", boards[3]]);
+    assert!(stdout(&measured).starts_with("12 of 12 poses measured"), "{}{}", stdout(&measured), stderr(&measured));
+}
+
+#[test]
 fn first_and_second_run_and_any_number_of_threads_give_the_same_bytes() {
     // The repository's pictures and a simulated world.
     for seed in 0..2 {

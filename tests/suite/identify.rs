@@ -471,6 +471,18 @@ fn another_arms_file_is_advised_against() {
         run(&["identify", "--method", "trust-region", "--measurements", measurements, "--robot", &file, "--out", arm]);
     let (out, err) = said(&output);
     assert_eq!(output.status.code(), Some(1), "{arm}: {out}{err}");
+    // On a screen the verdict and what to do come first, and the warnings below.
+    let (screen, path) = tempfile::NamedTempFile::new().expect("a file").into_parts();
+    let again =
+        ["identify", "--method", "trust-region", "--measurements", measurements, "--robot", &file, "--out", arm];
+    let both = [screen.try_clone().expect("the same file"), screen];
+    let [stdout, stderr] = both.map(std::process::Stdio::from);
+    let mut command = std::process::Command::new(crate::run::program());
+    command.current_dir(folder.path()).args(again).stdout(stdout).stderr(stderr).status().expect("it runs");
+    let screen = std::fs::read_to_string(&path).expect("what it said");
+    let at = |text: &str| screen.find(text).unwrap_or_else(|| panic!("no `{text}`: {screen}"));
+    assert!(at("do not use the identified") < at("\nnext: ") && at("\nnext: ") < at("\nkept: "), "{screen}");
+    assert!(at("\nwritten: ") < at("warning: "), "{screen}");
     assert!(out.starts_with("do not use the identified robot: "), "{arm}: {out}");
     let warnings: Vec<&str> = err.lines().filter(|line| line.starts_with("warning: ")).collect();
     // What the verdict says is not said before it as well.

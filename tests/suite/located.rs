@@ -95,7 +95,7 @@ fn several_places_of_one_group_have_their_rows_and_files() {
     let (half, count) = (moved.len() / 2, moved.len());
     moved[half..].iter_mut().for_each(|row| row[6] += 5.0);
     let (_, said, placement) = located(at, &moved, "truth/robot.toml");
-    assert!(said.contains("the rows fall into 2 sessions"), "{said}");
+    assert!(said.contains("the rows fall into 2 sessions, between which the sensor, the robot's base or"), "{said}");
     let names = [format!("rows 1 to {half}"), format!("rows {} to {count}", half + 1)];
     assert!(names.iter().all(|name| said.contains(&format!("base from instrument, 1, {name}: "))), "{said}");
     assert_eq!(placement["groups"][1]["rows"], serde_json::json!([(half + 1).to_string(), count.to_string()]));

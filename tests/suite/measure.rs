@@ -116,8 +116,10 @@ fn names_that_a_spreadsheet_took_zeros_from_find_their_pictures() {
     lines.push(lines.last().unwrap().replacen(&format!("{},", names.len()), "77,", 1));
     lines.push(lines.last().unwrap().replacen("77,", "78,", 1));
     std::fs::write(&list, lines.join("\n") + "\n").unwrap();
+    std::fs::copy(world.join("poses/left/001.png"), world.join("poses/left/stray.png")).unwrap();
     let again = stereocal(world, &["measure", "poses/", "--force"]);
     let said = stderr(&again);
+    assert_eq!(said.matches("left out: 1 picture without a partner (stray.png)").count(), 1, "{said}");
     assert_eq!(again.status.code(), Some(0), "{said}");
     assert!(said.contains("`1` of poses.csv is picture `001`"), "{said}");
     assert!(said.contains("poses 77, 78 are not measured: no pictures of this name"), "{said}");

@@ -40,6 +40,7 @@ fn what_a_beginner_mistypes() {
     refused(&["camera-check", "x", "--square-mm", "0.75in"], &[], 2, &["hint: ", "`--square-mm 19.05`"]);
     refused(&["camera-check", "l/1.png", "l/2.png", "l/3.png"], &[], 2, &["hint: pictures are named by their folder"]);
     refused(&["export", "calibration"], &[], 2, &["hint: ", "opencv, ros, kalibr, mrcal"]);
+    refused(&["simulate", "--squares", "9x6"], &[], 2, &["hint: there is `--board BOARD`"]);
     refused(&["guide", "bord"], &[], 2, &["no page `bord`", "hint: there are day, boards"]);
     refused(
         &["camera-check", "x", "--squares", "10x7"],
@@ -57,6 +58,12 @@ fn what_a_beginner_mistypes() {
     refused(&["measure", "x"], &[("x/poses.csv", "")], 2, &["calibration file not found", "`--calibration FILE`"]);
     let robot = [("x/poses.csv", ""), ("robot.toml", "name = \"r\"")];
     refused(&["measure", "x", "--calibration", "robot.toml"], &robot, 2, &["this is no JSON", "camera-check IMAGES"]);
+    refused(&["camera-check", "pose"], &[("poses/x", "")], 2, &["folder not found", "hint: there is poses: is it"]);
+    refused(&["robot", "show", "robo.toml"], &robot, 2, &["robot file not found", "hint: there is robot.toml: is it"]);
+    refused(&["identify", "--measurements", "pose/table.csv"], &[("poses/tables.csv", "")], 2, &["hint: `stereocal"]);
+    let table = [("poses/table.csv", "")];
+    let meant = "hint: there is poses/table.csv: is it meant? `stereocal measure POSES`";
+    refused(&["identify", "--measurements", "pose/table.csv"], &table, 2, &["not found", meant]);
     another_file_of_the_program();
     refused(&["identify", "--robot", "a.json"], &[("a.json", "{}")], 2, &["this is JSON", "hint: ", "robot new"]);
     refused(&["board", "9x6"], &[], 2, &["`9x6` names no board", "it is `checker:9x6:25`"]);
@@ -282,7 +289,12 @@ fn settings_as_init_writes_them_can_be_changed_line_by_line() {
         &["unknown key `squares`", "below `[check_board]`"],
     );
     let twice = "[check_board]\nsquares = \"9x7\"\nsquare_mm = 10.0\nsquare_mm = 20.0\n";
-    refused(&["identify"], &[("stereocal.toml", twice)], 2, &["duplicate key", "square_mm", "stereocal.toml:4"]);
+    refused(
+        &["identify"],
+        &[("stereocal.toml", twice)],
+        2,
+        &["duplicate key: `square_mm`, which stands in line 3 already", "stereocal.toml:4"],
+    );
 }
 
 #[test]

@@ -78,7 +78,16 @@ fn the_files_are_those_of_the_contract() {
     let counts: Vec<u64> = plan["expected"].as_array().unwrap().iter().map(|e| e["poses"].as_u64().unwrap()).collect();
     assert_eq!(counts, [10, 20, 24, 40, 80]);
     let page = std::fs::read_to_string(at.join("out/plan.html")).unwrap();
-    assert!(page.contains("What the cameras will see") && page.contains("as planned by Shi et al."));
+    // As many parameters are named as not determined as the rank lacks.
+    let [parameters, rank, zero] =
+        [plan["parameters"].as_u64(), plan["rank"].as_u64(), plan["zero"].as_array().map(|zero| zero.len() as u64)];
+    let [parameters, rank, zero] = [parameters, rank, zero].map(Option::unwrap);
+    let sums = format!("{} only in sums: d_2 + d_3 + d_4", parameters - rank - zero);
+    assert!(said.contains(&format!("{rank} of {parameters} parameters determined")) && said.contains(&sums), "{said}");
+    assert!(said.contains("as the table of plan.html says") && page.contains("left camera of each group"), "{said}");
+    assert!(
+        page.contains(&sums) && page.contains("What the cameras will see") && page.contains("as planned by Shi et al.")
+    );
     // What the figure is of, and no rows of another plan's counts.
     assert!(page.contains("that the identified parameters will leave") && !page.contains("n/a"), "{page}");
     assert!(said.contains("through the parameters alone") && !said.contains("n/a"), "{said}");

@@ -30,7 +30,7 @@ fn what_happened_over_the_pairs_stands_before_the_checks() {
         assert!(said.contains("1.0000 times as wide as high") && said.contains(ratio), "{said}");
         let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{side}: no `{text}`"));
         assert!(at(headings[1]) < at("Checks that are not passed") && !page.contains(headings[0]), "{side}");
-        let to_do = || &page[at("What to do next")..];
+        let to_do = || &page[at("What to do next")..at(headings[1])];
         assert!(said.starts_with("PASS") || to_do().contains("easure the board along and across"), "{side}: {said}");
         // The board is as good as it was, and nothing of it is in the rig.
         assert!(

@@ -52,6 +52,8 @@ pub(super) fn wait(
     known: &Knowledge,
     wanted: &Wanted<'_>,
 ) -> Result<()> {
+    // Whoever stands at the robot must know at once.
+    progress::say_held();
     let stop = Arc::new(AtomicBool::new(false));
     if signal_hook::flag::register(signal_hook::consts::SIGINT, Arc::clone(&stop)).is_err() {
         progress::warn("Ctrl-C ends the program without results here: it could not be caught");

@@ -118,7 +118,7 @@ fn examined(set: &Dataset, file: &Utf8Path, robot: &mut Robot, settings: &identi
     let Examined { set, robot: mended, along, findings, against, unexplained, .. } =
         examine::examine(set, robot, settings, &|_| {});
     let is_sound = unexplained.is_none() && against.is_empty() && mended == *robot;
-    let of_rows = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along));
+    let of_rows = along.instead.clone().into_iter().chain(record::findings::along_the_rows(&along, &set));
     for finding in against.into_iter().chain(findings).chain(unexplained).chain(of_rows) {
         progress::warn(finding.sentence());
     }

@@ -43,7 +43,7 @@ pub fn run(args: &Verify, against: &Utf8Path, config: &Config, run: Run) -> Resu
     let mut checks = formats::history(&out, HISTORY)?;
 
     let shift = shifted::find(&set, &robot).map(|shift| {
-        format!("{}; mend the file first: below, this looks like a change of the robot", shift.statement(&set))
+        format!("{}; mend the file first: else this looks like a change of the robot", shift.statement(&set))
     });
     let record = against.with_file_name("identification.json");
     let made_by = out.provenance();

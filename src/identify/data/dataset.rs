@@ -304,6 +304,18 @@ impl Dataset {
         nearest.map(|&(i, _)| i)
     }
 
+    /// What stands somewhere at a placement, and may have moved from one to the next.
+    pub fn stands(&self) -> &'static str {
+        let has_touches = (0..self.poses.len()).any(|row| self.touches(row));
+        match self.kind {
+            Kind::Distances if has_touches => "the socket",
+            Kind::Distances if self.groups.iter().any(|group| group.center.is_none()) => {
+                "the wire's anchor or its zero"
+            }
+            Kind::Distances | Kind::Positions => "the sensor",
+        }
+    }
+
     /// Whether a row's distance of zero says that the target was at its group's unknown point.
     pub fn touches(&self, row: usize) -> bool {
         let pose = &self.poses[row];

@@ -4,7 +4,8 @@
 //! and the standard deviation of a coordinate within them: what the instrument repeats. It says nothing about the
 //! robot, which stood still, so that as rows of their own they would count one error of the robot several times. A pose
 //! that the robot came back to is another row. One reading of three or more that is far from the others of its pose was
-//! misread, and is left out; of two nobody knows which.
+//! misread, and is left out; of two nobody knows which. Two that are as far from each other at every pose are of two
+//! points.
 
 use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
@@ -39,6 +40,9 @@ pub struct Repeats {
     /// Those that were misread and left out.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub misread: Vec<String>,
+    /// How far the two readings of each pose are from each other, where that is the same at all poses, mm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub two_points_mm: Option<f64>,
 }
 
 impl Repeats {
@@ -48,6 +52,15 @@ impl Repeats {
             "{} readings were repeated at {} poses: each pose counts once, with their mean; the instrument repeats to {:.4} mm",
             self.readings, self.poses, self.scatter_mm
         )
+    }
+
+    /// That readings are of two points, whose mean is none.
+    pub fn of_two_points(&self) -> Option<Finding> {
+        let said = format!(
+            "the two readings of each pose are {:.3} mm from each other at all poses: they are of two tools or targets, and their mean is of none",
+            self.two_points_mm?
+        );
+        Some(Finding::new(said, "identify each by itself, or name them in a column `target`"))
     }
 
     /// What was misread.
@@ -89,6 +102,7 @@ fn near(a: &Measurement, b: &Measurement) -> bool {
 fn as_one_where(rows: &[Measurement], same: impl Fn(&Measurement, &Measurement) -> bool + Copy) -> AsOne {
     let mut merged = Vec::with_capacity(rows.len());
     let (mut readings, mut poses, mut squares, mut freedom) = (0, 0, 0.0, 0usize);
+    let mut apart_mm = Vec::new();
     let far = misread(rows, same);
     let misread = far.iter().map(|&row| rows[row].at.pose.clone()).collect();
     let kept = rows.iter().enumerate().filter(|(row, _)| !far.contains(row));
@@ -104,11 +118,25 @@ fn as_one_where(rows: &[Measurement], same: impl Fn(&Measurement, &Measurement) 
                 squares += all.iter().map(|n| (n[k] - middle).powi(2)).sum::<f64>();
                 freedom += all.len() - 1;
             }
+            if let [Observed::Position { point_mm: a, .. }, Observed::Position { point_mm: b, .. }] =
+                pose.iter().map(|row| &row.observed).collect::<Vec<_>>()[..]
+            {
+                apart_mm.push((a - b).norm());
+            }
         }
     }
-    let repeats =
-        (poses > 0).then(|| Repeats { readings, poses, scatter_mm: (squares / freedom.max(1) as f64).sqrt(), misread });
-    (merged, repeats)
+    let scatter_mm = (squares / freedom.max(1) as f64).sqrt();
+    let two_points_mm = same_everywhere(&apart_mm);
+    (merged, (poses > 0).then_some(Repeats { readings, poses, scatter_mm, misread, two_points_mm }))
+}
+
+/// A distance that is the same at all poses, within a tenth: of lengths that an instrument's scatter makes, one in six
+/// is so near to their median.
+fn same_everywhere(lengths_mm: &[f64]) -> Option<f64> {
+    const FEWEST: usize = 8;
+    const SHARE: f64 = 0.1;
+    let middle = median(lengths_mm.iter().copied()).filter(|&mm| lengths_mm.len() >= FEWEST && mm > LEAST_MM)?;
+    lengths_mm.iter().all(|mm| (mm - middle).abs() < SHARE * middle).then_some(middle)
 }
 
 /// The readings that are far from the median of their pose, by their row.
@@ -207,6 +235,24 @@ mod tests {
         }
         // Of two readings nobody knows which is wrong.
         assert!(as_one(&[row(1.0, 0.1), row(1.0, 90.0), row(2.0, 5.0)]).1.unwrap().misread.is_empty());
+    }
+
+    #[test]
+    fn two_points_that_were_read_in_turn_are_no_repeated_readings() {
+        let world = synthetic::planned(40, 0, 25.0, 0.05, 1, &|_| {});
+        for (by_mm, varied, told) in [(5.0, 0.0, true), (0.3, 0.0, true), (5.0, 0.5, false), (0.02, 0.0, false)] {
+            let both = |(k, row): (usize, &Measurement)| {
+                let mut other = row.clone();
+                other.at.pose += "b";
+                synthetic::point(&mut other).x += by_mm * (1.0 + varied * (k as f64).sin());
+                [row.clone(), other]
+            };
+            let rows = world.rows.iter().filter(|row| row.at.role != Role::Center);
+            let rows: Vec<Measurement> = rows.enumerate().flat_map(both).collect();
+            let set = crate::identify::data::dataset::Dataset::new(&rows).unwrap();
+            let repeats = set.repeats.unwrap();
+            assert_eq!((repeats.of_two_points().is_some(), repeats.poses), (told, 40), "{by_mm} {varied}");
+        }
     }
 
     #[test]

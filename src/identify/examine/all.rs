@@ -5,6 +5,7 @@ use super::robots::tools::Moved;
 use super::sessions::{self, Along};
 use super::{conventions, covariances, known, orientations, robots, shifted};
 use crate::identify::data::dataset::Dataset;
+use crate::identify::data::repeats::Repeats;
 use crate::identify::finding::Finding;
 use crate::identify::settings::{Model, Settings};
 use crate::robot::Robot;
@@ -69,8 +70,9 @@ pub fn examine(set: &Dataset, robot: &Robot, settings: &Settings, step: &dyn Fn(
     // Sessions have placements of their own: a sensor that was moved does no harm there.
     let is_harmless = |tool: &Moved| tool.is_placed && !along.sessions.is_empty();
     against.extend(tool.filter(|tool| !is_harmless(tool)).map(|tool| tool.finding));
+    against.extend(uncut.repeats.as_ref().and_then(Repeats::of_two_points));
     if settings.examine && against.is_empty() && robots.is_none() {
-        against.extend(robots::of_files(&uncut, &robot));
+        against.extend(robots::of_files(&uncut, &robot).or_else(|| robots::alternating::find(&uncut, &robot)));
     }
     if settings.examine && against.is_empty() && along == Along::default() {
         against.extend(robots::loads::find(&uncut, &robot));

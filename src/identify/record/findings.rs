@@ -196,7 +196,7 @@ pub fn findings(set: &Dataset, found: &Identification, along: &Along) -> Vec<Fin
     misfits::of_rows(set, found)
         .into_iter()
         .chain(of_sensor(found))
-        .chain(along_the_rows(along))
+        .chain(along_the_rows(along, set))
         .chain(of_data(set, found))
         .collect()
 }
@@ -304,7 +304,7 @@ fn of_few_to_verify(set: &Dataset, found: &Identification) -> Option<Finding> {
 }
 
 /// Sessions and drifts.
-pub fn along_the_rows(along: &Along) -> Vec<Finding> {
+pub fn along_the_rows(along: &Along, set: &Dataset) -> Vec<Finding> {
     let mut list: Vec<Finding> = along.robots.iter().cloned().collect();
     let mut add = |finding: String, rows, action: &str| list.push(Finding::new(finding, action).about(rows));
     let drifts = |s: &Session| along.drifting.contains(&s.group);
@@ -315,8 +315,9 @@ pub fn along_the_rows(along: &Along) -> Vec<Finding> {
     if along.instead.is_none() && !stepping.is_empty() {
         add(
             format!(
-                "the rows fall into {} sessions, between which the sensor, the socket, the wire's anchor or its zero, the robot's base or the zero of joint 1 moved",
-                stepping.len()
+                "the rows fall into {} sessions, between which {}, the robot's base or the zero of joint 1 moved",
+                stepping.len(),
+                set.stands()
             ),
             stepping,
             "each session got a placement of its own",

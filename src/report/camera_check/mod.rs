@@ -67,12 +67,12 @@ pub fn page(calibration: &Calibration, judged: &Judged, corners: &Corners, pictu
     let warnings = warnings(judged);
     let content = html! {
         (page::verdict(tone, word(judged.verdict), &numbers(judged), &format!("{} {}.", advice(judged), capital(&deciding_by(judged, Evidence::short_figure)))))
+        @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
         @for (heading, of_board) in [("What happened during the series:", false), ("What was found of the board:", true)] {
             @let found = found(judged, of_board);
             @if !found.is_empty() { p { (heading) } (page::warnings(&found)) }
         }
         (ledger(judged))
-        @if !next.is_empty() { p { "What to do next:" } (page::warnings(&next)) }
         @if !warnings.is_empty() { p { "What else to know:" } }
         (page::warnings(&warnings))
         (scale(judged))

@@ -42,8 +42,8 @@ pub fn summary(calibration: &Calibration, judged: &Judged, out: &OutDir) -> Stri
     lines.extend(scale(judged));
     lines.extend(second_board(judged));
     let found = |finding: &Finding| match finding.is_of_board() {
-        true => format!("found over all pairs: {}", finding.action),
-        false => format!("during the series: {}", finding.action),
+        true => format!("found over all pairs: {}", finding.briefly()),
+        false => format!("during the series: {}", finding.briefly()),
     };
     lines.extend(judged.facts.findings.iter().map(found));
     lines.extend(pairs(calibration, &judged.facts.findings));

@@ -13,8 +13,8 @@ use crate::robot::Robot;
 use crate::robot::catalogue::PAPER;
 use crate::robot::file::IDENTIFIED_FILE as IDENTIFIED;
 
-/// What goes to stdout: whether to use the result, before, after, what to expect; how it was found; what was written,
-/// and what to do with it. `robot` is the file of the nominal robot, which comes before the identified one.
+/// What goes to stdout: whether to use the result, before, after, what to expect, and what to do with it; how it was
+/// found, and what was written. `robot` is the file of the nominal robot, which comes before the identified one.
 pub fn summary(
     record: &Record,
     (robot, identified): (Option<&Utf8Path>, &Robot),
@@ -34,6 +34,9 @@ pub fn summary(
         lines.push(expected.parts());
         lines.extend(known_near(expected));
     }
+    let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
+    let of_links = identified.corrections.is_empty();
+    lines.push(format!("next: {}", next(record, robot, (file.as_str(), of_links))));
     lines.push(String::new());
     lines.push(kept(record));
     lines.extend(others(record));
@@ -43,10 +46,7 @@ pub fn summary(
     lines.extend(record.targets.as_ref().map(|targets| targets.sentence()));
     lines.extend(of_scale(record));
     let placement = if is_placed { format!(", {}", out.join(PLACEMENT)) } else { String::new() };
-    let (file, page) = (out.join(IDENTIFIED), out.join("identify.html"));
     lines.push(format!("written: {file}{placement}; all methods and warnings: {page}"));
-    let of_links = identified.corrections.is_empty();
-    lines.push(format!("next: {}", next(record, robot, (file.as_str(), of_links))));
     lines.join("\n") + "\n"
 }
 
@@ -105,7 +105,7 @@ fn next(record: &Record, robot: Option<&Utf8Path>, (file, of_links): (&str, bool
             format!("go on with {robot}; more rows, that bend every joint, may show more (`stereocal guide poses`)")
         }
         Advice::DoNotUse => format!(
-            "mend what is named above, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the \
+            "mend what is named here, and identify again: `stereocal guide warnings`; `stereocal robot show {robot}` to compare it with the \
              pendant, `stereocal robot list` for other arms"
         ),
     }

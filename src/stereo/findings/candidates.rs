@@ -111,7 +111,7 @@ impl<'a> Candidate<'a> {
         match self.what {
             What::One(h) => format!("{} by {size:.3} {unit} (+- {})", h.words, two_digits(2.0 * self.change.sigma)),
             What::Refocused(side) => format!(
-                "the {} lens was focused otherwise (focal length by {size:.3} %, its picture moved by {:.2} px)",
+                "the {} lens was focused otherwise, its focal length by {size:.3} % (its picture moved by {:.2} px)",
                 side.name(),
                 amounts[1].hypot(amounts[2])
             ),
@@ -150,4 +150,17 @@ pub(super) fn likeliest<'a, 'b>(candidates: &'b [Candidate<'a>], pairs: usize) -
 /// What happened and by how much, in words, for each cause that it may have been.
 pub(super) fn described(equals: &[&Candidate]) -> String {
     equals.iter().map(|candidate| candidate.words()).collect::<Vec<String>>().join(", or ")
+}
+
+/// The same for a terminal: the first cause alone, without what stands in brackets where that is long or it may be
+/// another cause.
+pub(super) fn briefly(equals: &[&Candidate], may_be_another: bool) -> String {
+    const LONG: usize = 100;
+    let first = described(&equals[..1]);
+    let without_brackets = first.split(" (").next().unwrap_or(&first);
+    match may_be_another || equals.len() > 1 {
+        true => format!("{without_brackets}, or another cause (see the report),"),
+        false if first.len() > LONG => without_brackets.to_owned(),
+        false => first,
+    }
 }

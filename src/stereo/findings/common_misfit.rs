@@ -116,17 +116,21 @@ fn not_simultaneous(calibration: &Calibration, misfit: Misfit) -> Finding {
         )
     });
     let [left_px, right_px] = calibration.alone_px.map(two_digits);
+    let told = |otherwise: &str| {
+        format!(
+            "the pictures of the pairs were not taken at one moment: {otherwise}half of the pairs miss the rig by {:.2} px and more, the left camera alone \
+             its pictures by {left_px} px and the right one by {right_px} px",
+            misfit.usual_px
+        )
+    };
+    let worst = misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ");
     Finding {
         cause: Cause::NotSimultaneous.word().to_owned(),
         kind: Kind::Pair,
         size: Some(size.map_or(misfit.usual_px, |[mm, _]| mm)),
         unit: if size.is_some() { "mm" } else { "px" },
-        action: format!(
-            "the pictures of the pairs were not taken at one moment: {otherwise}half of the pairs miss the rig by {:.2} px and more, the left camera alone \
-             its pictures by {left_px} px and the right one by {right_px} px; the worst are {}",
-            misfit.usual_px,
-            misfit.worst_first.iter().take(WORST).cloned().collect::<Vec<_>>().join(", ")
-        ),
+        action: format!("{}; the worst are {worst}", told(&otherwise)),
+        brief: Some(told("")),
         pairs: misfit.worst_first,
         remedy: Some("trigger both cameras at once, or put the board on a stand for each pair".to_owned()),
         ..Finding::default()

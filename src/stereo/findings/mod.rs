@@ -31,7 +31,7 @@ use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use crate::stereo::calibrate::Calibration;
-use crate::stereo::findings::candidates::{Candidate, described, likeliest};
+use crate::stereo::findings::candidates::{Candidate, briefly, described, likeliest};
 use crate::stereo::findings::hypothesis::Hypothesis;
 use crate::stereo::findings::series::{Change, Line, Linear};
 use crate::stereo::model::Layout;
@@ -83,6 +83,9 @@ pub struct Finding {
     pub effect_mm: Option<f64>,
     /// What happened and what to do, for a person.
     pub action: String,
+    /// The same in two lines of a terminal, where it is longer.
+    #[serde(skip)]
+    pub brief: Option<String>,
     /// The change of the shared numbers over the pairs that the common rig was made from.
     #[serde(skip)]
     pub along: Option<Along>,
@@ -95,6 +98,11 @@ impl Finding {
     /// Whether it is what the board is like in all pairs, and nothing that happened over them.
     pub fn is_of_board(&self) -> bool {
         self.cause == Cause::OtherBoard.word() && self.kind == Kind::Step && self.along.is_none()
+    }
+
+    /// What happened, as the terminal says it.
+    pub fn briefly(&self) -> &str {
+        self.brief.as_ref().unwrap_or(&self.action)
     }
 }
 
@@ -337,12 +345,14 @@ fn finding(
         Kind::Step => format!("from pair {} on", name(best.first)),
         _ => format!("from pair {} to pair {}", name(0), name(count - 1)),
     };
-    let mut action = format!("{} {which}, which moves a length by up to {effect_mm:.4} mm", described(equals));
+    let mut moves = format!(" {which}, which moves a length by up to {effect_mm:.4} mm");
     if best.kind == Kind::Drift {
         let [before, after] = calibration.moment();
         let at = if before == after { format!("pair {before}") } else { format!("pairs {before} and {after}") };
-        action += &format!("; the rig is that of the middle of the series, at {at}");
+        moves += &format!("; the rig is that of the middle of the series, at {at}");
     }
+    let brief = briefly(equals, other.is_some()) + &moves;
+    let mut action = described(equals) + &moves;
     if let Some(WithoutOne { pair, words, .. }) = &other {
         action += &format!("; but pair {pair} alone decides what changed: without it, {words}");
     }
@@ -359,6 +369,7 @@ fn finding(
         unit,
         effect_mm: Some(effect_mm),
         action,
+        brief: Some(brief),
         along: Some(along),
     })
 }

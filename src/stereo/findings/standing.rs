@@ -310,12 +310,11 @@ fn later(corners: &Corners, asked: &Asked, all: &Calibration, change: &mut Findi
         change.remedy =
             hold(&change.cause, Some(&again.pairs).filter(|pairs| pairs.len() >= fewest).map(Vec::as_slice));
         let [from, by_mm] = [again.pairs.first().cloned(), again.effect_mm.map(|mm| format!("{mm:.4}"))];
-        change.action = format!(
-            "the rig goes on changing: {}; and it changed again from pair {} on, by up to {} mm",
-            change.action,
-            from.unwrap_or_default(),
-            by_mm.unwrap_or_default()
-        );
+        let [from, by_mm] = [from, by_mm].map(Option::unwrap_or_default);
+        let on = |first: &str| {
+            format!("the rig goes on changing: {first}; and again from pair {from} on, by up to {by_mm} mm")
+        };
+        (change.brief, change.action) = (Some(on(change.briefly())), on(&change.action));
         // Lengths may be off by the larger of both.
         change.effect_mm = again.effect_mm.into_iter().chain(change.effect_mm).reduce(f64::max);
         return None;

@@ -10,7 +10,7 @@
 
 use nalgebra::DVector;
 
-use super::candidates::{Candidate, described, likeliest};
+use super::candidates::{Candidate, briefly, described, likeliest};
 use super::common_misfit;
 use super::hypothesis;
 use super::one_side::MOST;
@@ -95,9 +95,10 @@ pub(super) fn retell(
     let before = before.filter(|before| before.layout == *layout);
     let Some(told) = before.and_then(|before| step(&before, after, told, lengths)) else { return };
     let effect_mm = told.effect_mm.unwrap_or(0.0);
-    let action = format!("{} from pair {first} on, which moves a length by up to {effect_mm:.4} mm", told.action);
+    let moves = format!(" from pair {first} on, which moves a length by up to {effect_mm:.4} mm");
+    let [action, brief] = [&told.action, told.briefly()].map(|what| format!("{what}{moves}"));
     let remedy = hold(&told.cause, None);
-    *change = Finding { action, remedy, pairs: std::mem::take(&mut change.pairs), ..told };
+    *change = Finding { action, brief: Some(brief), remedy, pairs: std::mem::take(&mut change.pairs), ..told };
 }
 
 /// Whether the numbers of a rig are known along a straight line.
@@ -172,6 +173,7 @@ fn step(
         unit,
         effect_mm: Some(lengths.most_changed_mm(&layout, &first.whole())),
         action: described(&equals),
+        brief: Some(briefly(&equals, false)),
         ..Finding::default()
     })
 }

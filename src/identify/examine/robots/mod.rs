@@ -8,10 +8,11 @@
 //! tried counted in; what is left must fall to half at the least; and the same rows cut along any of their joints must
 //! leave more, for a model that lacks something fits better in every smaller region. One robot with any term beyond its
 //! links must leave twice as much as well. Rows that are far off by themselves are errors of their own and no part of a
-//! state: they are left out first. Goes wrong: arms that differ by less than the model lacks; parts that alternate row
-//! by row; a sensor whose own errors changed between parts, which looks like another robot; a change along the rows
-//! that a term follows, as where a joint only turned one way while it happened.
+//! state: they are left out first. Goes wrong: arms that differ by less than the model lacks; a sensor whose own errors
+//! changed between parts, which looks like another robot; a change along the rows that a term follows, as where a joint
+//! only turned one way while it happened.
 
+pub(super) mod alternating;
 mod fit;
 pub(super) mod loads;
 pub(super) mod tools;

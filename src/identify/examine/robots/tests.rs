@@ -99,6 +99,26 @@ fn the_part_of_a_table_that_is_of_another_arm_is_found_where_it_begins() {
 }
 
 #[test]
+fn rows_that_alternate_between_two_arms_or_tools_are_told() {
+    for (off, tool_mm) in [(0.0, 0.0), (0.0, 2.0), (2.0, 0.0), (2.0, 30.0)] {
+        for seed in [1, 3] {
+            let worlds = [arm(30, 0.0, 0.0, seed), arm(30, off, tool_mm, seed + 20)];
+            let (mut set, robot) = tables(&worlds, false);
+            let late = set.poses.split_off(set.poses.len() / 2);
+            set.poses = set.poses.into_iter().zip(late).flat_map(|(early, late)| [early, late]).collect();
+            let said = alternating::find(&set, &robot).map(|finding| finding.finding);
+            let is_told = said.as_ref().is_some_and(|said| said.starts_with("every other row is of another arm"));
+            assert_eq!(is_told, off + tool_mm > 0.0, "{off}, {tool_mm} mm, seed {seed}: {said:?}");
+            let examined = crate::identify::examine::examine(&set, &robot, &Settings::default(), &|_| {});
+            assert_eq!(examined.against.first().map(|finding| finding.finding.clone()), said);
+        }
+    }
+    for (set, robot) in lacking(0, 2, 0.1, 1) {
+        assert_eq!(alternating::find(&set, &robot), None);
+    }
+}
+
+#[test]
 fn one_robot_is_one_whatever_was_moved_beside_it() {
     for seed in [0, 8] {
         let (samples, tool_mm) = ([12, 30, 60][seed as usize % 3], [0.0, 2.0, 60.0][seed as usize / 3 % 3]);
