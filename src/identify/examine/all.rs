@@ -106,3 +106,6 @@ fn within_sessions(
     findings.extend(again.findings);
     (again.set, again.robot, None)
 }
+
+#[cfg(test)]
+mod tests;

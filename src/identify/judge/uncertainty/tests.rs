@@ -2,6 +2,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
+use crate::geometry::fitted_frame;
 use crate::identify::judge::errors::Judge;
 use crate::identify::run::Identification;
 use crate::identify::synthetic;
@@ -48,6 +49,26 @@ fn nineteen_of_twenty_errors_at_fresh_poses_are_below_what_is_promised() {
         let share = below as f64 / all as f64;
         assert!((0.93..0.98).contains(&share) && all > 900, "{samples} rows: {share} of {all}");
     }
+}
+
+/// Touches leave the robot's scale as it is in its file, and what moves all touches of a socket alike shows in none:
+/// both are errors of the robot all the same.
+#[test]
+fn what_touches_promise_holds_wherever_the_robot_goes() {
+    let (mut below, mut all) = (0, 0);
+    for seed in 1..9 {
+        let (world, _) = synthetic::touched(0.0, seed);
+        let (set, found) = world.identified(&world.rows);
+        let promised_mm = Expected::new(found.formulation().unwrap(), &set, &found.fitted, &[]).p95_mm;
+        let pairs = set.poses.iter().map(|pose| {
+            let of = |robot: &Robot| robot.target_mm(&pose.joints_rad);
+            (of(found.robot()), of(&world.truth), 1.0)
+        });
+        let frame = fitted_frame(pairs.clone());
+        below += pairs.clone().filter(|(found, truth, _)| (frame * found - truth).norm() < promised_mm).count();
+        all += set.poses.len();
+    }
+    assert!(below as f64 > 0.93 * all as f64, "{below} of {all}");
 }
 
 /// A robot that comes back to the same few poses says no more of its links than once, however well it repeats there.
