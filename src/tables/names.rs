@@ -6,7 +6,7 @@
 //! that a point was sent to the robot or computed, not measured, make it commanded. What goes wrong: `x y z` alone may
 //! be either, and a set of joints is one only where it is complete; who reads the table decides.
 
-use super::vocabulary::{COMMANDED, ELSE, ENCODER, INSTRUMENT, JOINT, MEASURED, PLAIN, UNREAD, is_in};
+use super::vocabulary::{COMMANDED, DISTANCE, ELSE, ENCODER, INSTRUMENT, JOINT, MEASURED, PLAIN, UNREAD, is_in};
 
 /// A unit of a joint or of a length.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -264,8 +264,7 @@ fn distance(words: &[String]) -> Option<(What, Vec<String>)> {
         matches!(w.as_str(), "coef" | "coefs" | "coeff" | "coeffs" | "coefficient" | "coefficients" | "distortion")
     };
     let is_lens = words.iter().any(of_lens);
-    let is_it = |w: &String| matches!(w.as_str(), "l" | "distance" | "dist" | "length" | "len");
-    let at = words.iter().position(is_it).filter(|_| !is_lens)?;
+    let at = words.iter().position(|word| is_in(DISTANCE, word)).filter(|_| !is_lens)?;
     Some((What::Distance, without(words, &[at])))
 }
 
@@ -365,6 +364,9 @@ mod tests {
         assert_eq!(what("L").0, What::Distance);
         assert_eq!(what("dist_coeffs_1").0, What::Other);
         assert_eq!(what("distance_mm"), (What::Distance, Some(Unit::Mm), None));
+        for name in ["Länge mm", "Abstand [mm]", "距离(mm)"] {
+            assert_eq!(what(name), (What::Distance, Some(Unit::Mm), None), "{name}");
+        }
         assert_eq!(what("pose").0, What::Own("pose"));
     }
 }

@@ -1,5 +1,8 @@
 //! Words of columns' names, in the languages that tables were found in; a list is separated by spaces.
 
+/// What distances are called.
+pub const DISTANCE: &str = "l distance dist length len abstand distanz länge laenge longueur 距离 长度";
+
 /// What joints are called.
 pub const JOINT: &str = "j q joint joints theta θ th axis ax a jnt jt jointangle jointpos jointposition angle gelenk achse \
     articulation axe 关节 关节角 关节角度 轴";

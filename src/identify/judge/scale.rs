@@ -98,6 +98,13 @@ impl CommonScale {
     /// The scale that was found, or how large a one would not be.
     pub fn sentence(&self) -> String {
         let CommonScale { share, sigma, unseen, of, .. } = *self;
+        // Only distances that are alike leave as much open: a shorter robot and a longer reading do the same to them.
+        if unseen > 1.0 {
+            return format!(
+                "the {of} are too similar to tell a robot of another size from an offset of theirs; measure at distances that differ, or set \
+                 `wire_offset = false` where the offset is zero"
+            );
+        }
         let (percent, way) = (100.0 * share.abs(), if share > 0.0 { "longer" } else { "shorter" });
         if !self.is_significant() {
             return format!(
@@ -250,6 +257,18 @@ mod tests {
             assert_eq!(log_odds > SIGNIFICANT, told, "{error_mm} {share}: {log_odds} {found}");
             assert!((found - share).abs() < 0.005 * error_mm.max(0.1), "{error_mm} {share}: {found}");
         }
+    }
+
+    #[test]
+    fn readings_that_do_not_tell_the_robots_size_are_told_without_a_figure() {
+        let of = of_links(&[400.0, -300.0, 250.0, 100.0, 50.0], &[0.4, -0.2, 0.3, 0.1, -0.2]);
+        assert!(of.sentence().contains("a scale error of the readings of up to"), "{}", of.sentence());
+        let untold = CommonScale { share: -86.0, sigma: 79.0, unseen: 265.0, ..of };
+        let said = untold.sentence();
+        assert!(
+            said.contains("too similar") && said.contains("`wire_offset = false`") && !said.contains('%'),
+            "{said}"
+        );
     }
 
     /// An arm of two long links, of which half of what one is off by is a scale of both.

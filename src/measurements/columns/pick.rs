@@ -196,7 +196,7 @@ fn joints(parts: &[Part], count: usize) -> Result<Vec<At>> {
             let message = format!(
                 "{found} columns of joints, but the robot has {count} joints, counted from 1 or 0 without a gap"
             );
-            let hint = "`--robot FILE` names the robot that was measured; `--columns` names the columns";
+            let hint = "`--robot FILE` names the robot that was measured; `--columns` names all joints in their order, a rail (`E1`) as well";
             Err(parts[part].refuse(message, Some(hint)))
         }
         _ => Ok(Vec::new()),

@@ -35,7 +35,7 @@ pub(in crate::measurements) fn lacking(parts: &[Part], picked: &Picked, count: u
     let sheets = sheets.map_or(String::new(), |p| format!(", `{}#SHEET` another sheet", p.file_name()));
     let hint = format!(
         "{}another `--measurements FILE` joins the file that has them row by row{sheets}; \
-         `--columns j1,j2,...,-,x,y,z` names the columns{} in their order, `-` skips one{touches}",
+         `--columns j1,j2,...,-,x,y,z` names the columns{} in their order (`distance_mm` of distances), `-` skips one{touches}",
         lying(parts, count),
         side_by_side(parts)
     );
