@@ -173,11 +173,16 @@ fn other_counts(board: &Board, size: (usize, usize), reads: &[Read]) -> Option<S
         (found.agreeing >= FEWEST).then_some((found.agreeing, columns, rows_seen(&found, size)))
     });
     let first = counts.next()?;
-    let (_, columns, rows_seen) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+    let (agreeing, columns, rows_seen) = counts.fold(first, |best, next| if next.0 > best.0 { next } else { best });
+    // Columns and rows are easily said in the wrong order.
+    let exchanged = Squares { columns: board.squares.rows, rows: board.squares.columns };
+    let is_exchanged = || match numbering::place(&Board { squares: exchanged, ..*board }, size, reads) {
+        Said::Place(found) => found.agreeing >= agreeing,
+        _ => false,
+    };
     let rows = match board.kind {
+        _ if columns == exchanged.columns && is_exchanged() => exchanged.rows,
         Kind::Tags { .. } => board.squares.rows,
-        // Columns and rows are easily said in the wrong order.
-        _ if columns == board.squares.rows => board.squares.columns,
         // Whoever miscounted the columns may have miscounted the rows: those that are seen are sure.
         _ => rows_seen,
     };

@@ -337,7 +337,10 @@ fn unlike(board: &Board, tags: &[Tag], others: impl Iterator<Item = Order>) -> S
             "shows the markers of a board of {} columns of tags; --board says {columns}x{rows} (columns first, as printed)",
             other.columns
         );
-        let squares = Squares { columns: 2 * other.columns + 1, ..board.squares };
+        // Columns and rows are easily said in the wrong order.
+        let is_exchanged = other.columns == rows;
+        let rows = if is_exchanged { board.squares.columns } else { board.squares.rows };
+        let squares = Squares { columns: 2 * other.columns + 1, rows };
         return Seen::Other(Refusal { reason, seen: Some(Board { squares, ..*board }) });
     }
     let numbers: BTreeSet<usize> = tags.iter().map(|tag| tag.number).collect();

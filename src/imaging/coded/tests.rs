@@ -203,6 +203,20 @@ fn another_board_is_named() {
 }
 
 #[test]
+fn counts_that_were_said_in_the_wrong_order_are_named_as_they_are() {
+    for (shown, said) in [
+        (BOARD, "charuco:7x9:20:14:DICT_5X5_100"),
+        (TAGS, "apriltag:4x5:tag36h11:24:7.2"),
+        ("apriltag:5x4:tag36h11:24:7.2:opencv", "apriltag:4x5:tag36h11:24:7.2:opencv"),
+    ] {
+        let (picture, _) = Shot::of(shown, [0.3, -0.25, 0.2], [3.0, -2.0, 480.0]).taken();
+        let refusal = refused(&picture, said);
+        let seen = refusal.seen.unwrap_or_else(|| panic!("{said}: {}", refusal.reason));
+        assert_eq!(seen.squares, shown.parse::<Board>().unwrap().squares, "{said}: {}", refusal.reason);
+    }
+}
+
+#[test]
 fn a_plain_board_is_counted_where_markers_were_looked_for() {
     let plain = "checker:9x7:20";
     let (picture, _) = Shot::of(plain, [0.3, -0.25, 0.2], [3.0, -2.0, 560.0]).taken();
