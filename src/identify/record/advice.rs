@@ -231,8 +231,9 @@ impl Record {
 
     fn zero_of_readings(&self, found: &Identification) -> Option<String> {
         let zero_mm = found.formulation()?.zero_sigma_mm().unwrap_or(0.0);
-        let expected_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.of_robot_mm);
-        (zero_mm > expected_mm && findings::zero(found).is_none()).then(|| {
+        // What is expected of the robot holds what its size is uncertain by for want of the zero.
+        let scatter_mm = self.expected.as_ref().map_or(f64::INFINITY, |e| e.scatter_mm);
+        (zero_mm > scatter_mm && findings::zero(found).is_none()).then(|| {
             format!(
                 "the distances are too similar to separate an offset of the readings from a robot of another size: the offset is known to \
                  {zero_mm:.2} mm only; measure at distances that differ, or set `wire_offset = false` where the offset is zero"

@@ -193,8 +193,12 @@ impl Formulation {
 
     /// What the rows say of tolerances.
     fn with_likelihood<T>(&self, ask: impl FnOnce(&Likelihood) -> T) -> T {
-        let (normal, gradient) = self.normal();
+        let (mut normal, gradient) = self.normal();
         let (base, parameters, extras) = (&self.base, self.parameters(), self.rows.extras.as_slice());
+        let unscaled = (!self.scale_seen).then_some(&self.rows.kinematics.nominal);
+        // Touches fit the better the shorter all links are, which is no evidence of how well they are made.
+        let held = prior_rows(&self.tolerance, base, parameters, extras, false, unscaled);
+        normal += held.tr_mul(&held);
         ask(&Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient })
     }
 
@@ -284,7 +288,9 @@ impl<'a> Estimate<'a> {
     fn round(&mut self, round: usize, held: bool) {
         let (task, rows) = (self.task, self.rows());
         if held {
-            let (normal, gradient) = self.fit(&rows, DMatrix::zeros(0, self.x.len())).normal(&self.x);
+            let (mut normal, gradient) = self.fit(&rows, DMatrix::zeros(0, self.x.len())).normal(&self.x);
+            let held = task.prior_rows(&self.tolerance, &self.base, false);
+            normal += held.tr_mul(&held);
             let (base, Task { parameters, extras, .. }) = (&self.base, *task);
             let data = Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient };
             self.tolerance = data.most_probable();
