@@ -218,7 +218,7 @@ pub enum Durability {
 }
 
 /// How the names of files begin that are being written.
-const TEMPORARY: &str = ".stereocal-";
+pub(super) const TEMPORARY: &str = ".stereocal-";
 
 /// Whether a file of this name was being written.
 pub fn is_temporary(name: &str) -> bool {

@@ -14,7 +14,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use camino::{Utf8Path, Utf8PathBuf};
 use serde::Serialize;
 
-use super::io::{Durability, Error, Result, is_temporary, to_json, without_path, write_atomically};
+use super::io::{Durability, Error, Result, TEMPORARY, is_temporary, to_json, without_path, write_atomically};
 use super::provenance::{Digested, KEY, Provenance, Run, pictures, sha256};
 use crate::progress;
 
@@ -71,7 +71,8 @@ impl OutDir {
         }
         let io = |action, source| Error::Io { action, path: path.to_owned(), source };
         std::fs::create_dir_all(path).map_err(|e| io("create", e))?;
-        tempfile::NamedTempFile::new_in(path).map_err(|e| io("write into", without_path(e)))?;
+        let probe = tempfile::Builder::new().prefix(TEMPORARY).tempfile_in(path);
+        probe.map_err(|e| io("write into", without_path(e)))?;
         std::fs::create_dir_all(path.join(OWN)).map_err(|e| io("write into", e))?;
         let lock = lock(path);
         let log =
