@@ -137,8 +137,13 @@ impl Formulation {
 
     /// Rows of the prior of these standard deviations; none without one.
     fn prior(&self, tolerance: &Tolerance, extras: &[Extra]) -> DMatrix<f64> {
+        self.prior_held(tolerance, extras, self.held)
+    }
+
+    /// The same where the tolerances hold the parameters or not; a scale that nothing sees is held all the same.
+    fn prior_held(&self, tolerance: &Tolerance, extras: &[Extra], held: bool) -> DMatrix<f64> {
         let unscaled = (!self.scale_seen).then_some(&self.rows.kinematics.nominal);
-        prior_rows(tolerance, &self.base, self.parameters(), extras, self.held, unscaled)
+        prior_rows(tolerance, &self.base, self.parameters(), extras, held, unscaled)
     }
 
     /// The problem in its box, the sensor's errors fixed where the free fit found them.
@@ -195,9 +200,8 @@ impl Formulation {
     fn with_likelihood<T>(&self, ask: impl FnOnce(&Likelihood) -> T) -> T {
         let (mut normal, gradient) = self.normal();
         let (base, parameters, extras) = (&self.base, self.parameters(), self.rows.extras.as_slice());
-        let unscaled = (!self.scale_seen).then_some(&self.rows.kinematics.nominal);
         // Touches fit the better the shorter all links are, which is no evidence of how well they are made.
-        let held = prior_rows(&self.tolerance, base, parameters, extras, false, unscaled);
+        let held = self.prior_held(&self.tolerance, extras, false);
         normal += held.tr_mul(&held);
         ask(&Likelihood { base, parameters, extras, normal: &normal, gradient: &gradient })
     }
